@@ -102,7 +102,7 @@ def _noted(system: CompiledSystem, t: float, y: Array, v: Array, a: Array) -> _W
     try:
         residual = plain(system.residual, called=called)
         residual(reals, system.integers, system.scratch.astype(object), now[0], *state, out)
-    except TypeError:
+    except (TypeError, ArithmeticError):
         return None
     finally:
         _now.pop()

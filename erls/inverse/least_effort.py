@@ -32,6 +32,7 @@ _ITERATIONS, _HALVINGS = 30, 8
 _STEP = 1e-6  # rad, and of a link: of differences
 _WIDE = 1.0  # the same: what a joint moves in an iteration at most
 _SETTLED = 1e-8  # of the sum of squares: what an iteration gains at least
+_STILL = 1e-3  # of the size of a joint: what the last step moves where no part of it gains
 _REST = Polynomial([0.25, 0.0, -1.0]) ** 4
 LAWS = [
     (_REST * Legendre.basis(k, domain=[-0.5, 0.5]).convert(kind=Polynomial)).integ(lbnd=-0.5) for k in range(_TERMS)
@@ -39,8 +40,8 @@ LAWS = [
 """Of x - 1/2: in powers of x they would end in rounding."""
 
 
-def of_least_effort(conditions: Conditions, rigid: Callable[[Conditions], Servoed]) -> Conditions:
-    """With the motion of spare joints as further conditions.
+def of_least_effort(conditions: Conditions, rigid: Callable[[Conditions], Servoed]) -> tuple[Conditions, bool]:
+    """With the motion of spare joints as further conditions, and whether the search for it came to its end.
 
     Parameters
     ----------
@@ -70,7 +71,7 @@ def of_least_effort(conditions: Conditions, rigid: Callable[[Conditions], Servoe
             best = found
     if best is None:
         raise problems[0]
-    return _with(conditions, best.spare, [_law(row) for row in best.coefficients], whole)
+    return _with(conditions, best.spare, [_law(row) for row in best.coefficients], whole), best.settled
 
 
 class _Spare(NamedTuple):
@@ -86,11 +87,14 @@ class _Spare(NamedTuple):
 
 
 class _Least(NamedTuple):
-    """Coefficients (j, terms) of the laws of spare joints, and the sum of squares of the efforts."""
+    """Coefficients (j, terms) of the laws of spare joints, the sum of squares of the efforts, and whether the search
+    came to its end.
+    """
 
     spare: tuple[_Spare, ...]
     coefficients: Array
     square: float
+    settled: bool
 
 
 def _law(coefficients: Array) -> Polynomial:
@@ -166,6 +170,7 @@ class _Search:
         found = np.zeros(shape)
         efforts = self._efforts(found, True)
         steps = np.repeat(_STEP * self._sizes, _TERMS) / np.tile(np.abs(self._laws[0]).max(axis=1), len(self._start))
+        settled = False
         for _ in range(_ITERATIONS):
             before = float(efforts @ efforts)
             try:
@@ -177,11 +182,13 @@ class _Search:
             far = float((np.abs(change @ self._laws[0]).max(axis=1) / self._sizes).max())
             better = self._along(found, change * min(1.0, _WIDE / max(far, _WIDE)), before)
             if better is None:
+                settled = far < _STILL
                 break
             found, efforts = better
-            if before - float(efforts @ efforts) < _SETTLED * before:
+            settled = before - float(efforts @ efforts) < _SETTLED * before
+            if settled:
                 break
-        return _Least(self._spare, found, float(efforts @ efforts))
+        return _Least(self._spare, found, float(efforts @ efforts), settled)
 
     def _along(self, found: Array, change: Array, before: float) -> tuple[Array, Array] | None:
         """Coefficients with less effort on the way of a change, and their efforts."""

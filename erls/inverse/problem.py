@@ -97,9 +97,10 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     if len(drives) > len(conditions.every):
         tell("finding the motion of least effort")
         held = conditions
-        conditions = of_least_effort(held, partial(_rigid, scene, bare, drives=drives))
+        conditions, settled = of_least_effort(held, partial(_rigid, scene, bare, drives=drives))
         spare = ", ".join(each.name for each in conditions.every[len(held.every) :])
-        warnings = (*warnings, f"{spare}: moved for the least effort of rigid links")
+        far = "" if settled else ", as far as the search for it came"
+        warnings = (*warnings, f"{spare}: moved for the least effort of rigid links{far}")
     flexible = _servoed(scene, free, conditions, drives)
     stiff = _rigid(scene, bare, conditions, drives)
     t = _knots(scene, flexible.tree.size)

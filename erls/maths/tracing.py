@@ -139,15 +139,20 @@ class Traced:
         return self._function("reciprocal") * other
 
     def __pow__(self, exponent: Any) -> Any:
-        if not isinstance(exponent, int) or exponent < 1:
-            return (self._function("log") * exponent)._function("exp")
+        if exponent != int(exponent) or exponent < 1:
+            if not self > 0.0:
+                raise TypeError("such a power of no positive number")
+            return 1.0 if exponent == 0 else (self._function("log") * exponent)._function("exp")
         found = self
-        for _ in range(exponent - 1):
+        for _ in range(int(exponent) - 1):
             found = found * self
         return found
 
     def __abs__(self) -> Any:
         return self._function("fabs")
+
+    def __bool__(self) -> bool:
+        return bool(self != 0.0)
 
     def __float__(self) -> float:
         raise TypeError("a number on a tape is no single value")

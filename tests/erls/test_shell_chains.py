@@ -18,9 +18,10 @@ from numpy.typing import NDArray
 import erls
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.equations import Nodal
-from erls.equations.nodal.parts import LinkParts, link_parts
+from erls.equations.nodal.parts import LinkParts, carried, link_parts
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.equations.nodal.shell import Shells
+from erls.equations.nodal.surfaces import corner_frames
 from erls.errors import SceneError
 from erls.maths.se3 import pose
 from erls.mechanism.links import Link
@@ -219,3 +220,18 @@ def test_what_nodal_shells_cannot_do_is_named(tmp_path: Path) -> None:
     assert link.shells is not None
     with pytest.raises(SceneError, match="SPRINGA"):
         link_parts(replace(link, shells=replace(link.shells, others=("SPRINGA",))), None, 1)
+
+
+def test_only_layers_need_a_direction_within_their_surface() -> None:
+    """Two squares across a fold: along the normal of the second one, a direction is good for the first one's layers."""
+    places = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [1, 0, 1], [1, 1, 1]], dtype=float)
+    cells, along = np.array([[0, 1, 2, 3], [1, 4, 5, 2]]), np.array([1.0, 0.0, 0.0])
+    found = corner_frames(places, cells, 25.0, "link", np.array([along, 0 * along]))
+    np.testing.assert_allclose(found[0, :, :3, 0], np.tile(along, (4, 1)), atol=1e-15)
+    with pytest.raises(SceneError, match="direction of layers stands on the surface"):
+        corner_frames(places, cells, 25.0, "link", along)
+
+
+def test_what_no_shell_carries_is_refused() -> None:
+    with pytest.raises(SceneError, match="sits where the mesh has no shell"):
+        carried(np.array([0, -1, 1]), 1, "link 'panel'")

@@ -117,7 +117,8 @@ def test_blocks_behind_a_spring_that_is_pulled(forces: tuple[float, float, float
     found = [t for t in switches(run) if t > 0.03]
     assert found == pytest.approx(expected[expected < run.end], abs=1e-6)
     assert len(found) > 3
-    assert np.abs(run.joint_rate("across", np.array([0.1, expected[1] + rests / 2]))).max() < SEEN
+    rates = np.abs(run.joint_rate("across", np.array([0.1, expected[1] + rests / 2])))
+    assert rates.max() <= (SEEN if forces[2] else 0.0)
 
 
 SEEN = 1e-9  # m, rad or per second: of joints that are held by stiff springs, where closing joints stick

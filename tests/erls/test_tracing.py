@@ -62,3 +62,18 @@ def test_no_single_value() -> None:
     """What takes a number for that of one state cannot be noted."""
     with pytest.raises(TypeError):
         float(Tape().leaves([1.0])[0])
+
+
+def test_powers_and_truth() -> None:
+    """Whole exponents of any type are products; others are of positive numbers; truth is noted as a choice."""
+    tape = Tape()
+    x, y, zero = tape.leaves([-2.0, 4.0, 0.0])
+    assert [(x**k).value for k in (2, 2.0, np.int64(2))] == [4.0, 4.0, 4.0]
+    assert (y**-0.5).value == pytest.approx(0.5, rel=1e-15)
+    assert y**0 == 1.0
+    with pytest.raises(TypeError, match="power"):
+        x**0.5
+    before = len(tape.guards)
+    assert not zero
+    assert y
+    assert len(tape.guards) == before + 2

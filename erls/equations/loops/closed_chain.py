@@ -397,11 +397,11 @@ class ClosedChain(Tied):
         y, v = self._closed_at(t, y, v)
         loops, links = self.mechanism.loops, self.mechanism.links
         found, loads = np.empty((len(t), self.size)), np.empty((len(t), len(links)))
-        rubbed = np.empty((len(t), len(links)))
+        friction_within = np.empty((len(t), len(links)))
         given: list[list[LoopForce]] = []
         for i, at in enumerate(t.tolist()):
             found[i], multipliers, closure = self.accelerations(at, y[i], v[i])
-            rubbed[i], friction = held_friction(self, at, y[i], v[i])
+            friction_within[i], friction = held_friction(self, at, y[i], v[i])
             wrenches = self._wrenches(found[i], multipliers, closure, friction)
             given.append([applied(outer, wrench) for outer, wrench in zip(closure.outer, wrenches, strict=True)])
             loads[i] = -(np.concatenate(closure.moves).T @ np.concatenate(wrenches))[: len(links)]
@@ -421,7 +421,7 @@ class ClosedChain(Tied):
         for k, joint in enumerate(self.mechanism.joints):
             if joint.drive.prescribed:
                 result.effort[:, k] += loads[:, k]
-        result.effort[:] += rubbed
+        result.effort[:] += friction_within
         if self.dry is not None:  # those that stick bear loads, too
             joints = self.bare.free_joints[self.dry.places]
             result.effort[:, joints] += np.where(v[:, self.dry.places] == 0.0, loads[:, joints], 0.0)

@@ -131,7 +131,7 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
         There is none.
     """
     if len(parts.carriers):
-        return int(parts.carriers[number])
+        return carried(parts.carriers, number, where)
     if not parts.beams:
         return 0
     end = round(float(parts.fractions[number]))
@@ -144,6 +144,26 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
             remedy="let simulation.elements_per_member be a multiple of the link's own elements",
         )
     return parts.beams[int(parts.elements[number])].nodes[end]
+
+
+def carried(carriers: IntArray, number: int, where: str) -> int:
+    """Node of a link of shells that carries a node of its mesh.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: there is none.
+    """
+    found = int(carriers[number])
+    if found < 0:
+        raise SceneError(
+            Cause.BAD_FIELD,
+            "a mass, a payload, a load or a point sits where the mesh has no shell",
+            where=where,
+            value=f"node {number}",
+            remedy="put it at a corner of a shell or at an interface, or use another formulation",
+        )
+    return found
 
 
 def _beams_and_bodies(

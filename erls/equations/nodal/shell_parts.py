@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from erls.equations.nodal.parts import LinkParts, refused
+from erls.equations.nodal.parts import LinkParts, carried, refused
 from erls.equations.nodal.rigid_body import RigidBody, joined
 from erls.equations.nodal.shell import Shell, lumped_shells
 from erls.equations.nodal.surfaces import FOLD_DEG, corner_frames, quartered
@@ -25,7 +25,7 @@ def shell_link_parts(link: Link, shells: LinkShells, times: int) -> LinkParts:
     Raises
     ------
     SceneError
-        An averaged interface, or attachments other than masses; the link is named.
+        An averaged interface, attachments other than masses, or a mass where no shell is; the link is named.
     """
     where = f"link {link.name!r}"
     model = link.model
@@ -58,10 +58,11 @@ def shell_link_parts(link: Link, shells: LinkShells, times: int) -> LinkParts:
         for cell, frame, k in zip(cells, frames, make.tolist(), strict=True)
     ]
     poses = np.array([pose(position=x) for x in places[used]])
-    bodies = lumped_shells(every, poses) + _masses(shells, own, places, places[used])
+    bodies = lumped_shells(every, poses) + _masses(shells, own, places, places[used], where)
     for payload in link.payloads:
-        arm = model.nodes[payload.node] - places[used][own[payload.node]]
-        bodies.append(RigidBody(int(own[payload.node]), payload.mass, payload.inertia, arm + payload.offset))
+        carrier = carried(own, payload.node, where)
+        arm = model.nodes[payload.node] - places[used][carrier]
+        bodies.append(RigidBody(carrier, payload.mass, payload.inertia, arm + payload.offset))
     return LinkParts(
         nodes=places[used],
         shells=[shell for shell in every if len(set(shell.nodes)) > 1],
@@ -72,18 +73,14 @@ def shell_link_parts(link: Link, shells: LinkShells, times: int) -> LinkParts:
 
 def _frames(shells: LinkShells, places: Array, cells: IntArray, make: IntArray, where: str) -> Array:
     """At the corners; normals are those of the whole surface, first axes those of each make."""
-    frames = corner_frames(places, cells, FOLD_DEG, where)
-    for k, direction in enumerate(shells.directions):
-        if direction.any():
-            frames[make == k] = corner_frames(places, cells, FOLD_DEG, where, direction)[make == k]
-    return frames
+    return corner_frames(places, cells, FOLD_DEG, where, shells.directions[make])
 
 
-def _masses(shells: LinkShells, own: IntArray, places: Array, nodes: Array) -> list[RigidBody]:
+def _masses(shells: LinkShells, own: IntArray, places: Array, nodes: Array, where: str) -> list[RigidBody]:
     """Point masses."""
     found = []
     for row, node in zip(shells.masses, shells.mass_nodes.tolist(), strict=True):
-        carrier = int(own[node])
+        carrier = carried(own, node, where)
         inertia = row[4:].reshape(3, 3)
         found.append(RigidBody(carrier, float(row[0]), inertia, places[node] - nodes[carrier] + row[1:4]))
     return found

@@ -27,7 +27,8 @@ _ALONG = 1e-3  # sine of the angle between a direction and the normal of a surfa
 def corner_frames(places: Array, cells: IntArray, fold_deg: float, where: str, reference: Array | None = None) -> Array:
     """(e, 4, 4, 4) frames at the corners: z the mean normal of the elements there that meet at no fold.
 
-    x comes nearest to ``reference`` (3,); in its place, to the axis in the middle of each element.
+    x comes nearest to ``reference``, (3,) or (e, 3); in its place or where that is zero, to the axis in the middle of
+    each element.
 
     Raises
     ------
@@ -49,18 +50,19 @@ def corner_frames(places: Array, cells: IntArray, fold_deg: float, where: str, r
         )  # fmt: skip
     normals /= lengths
     means = _smooth(normals, cells, triangle, fold_deg, len(places))
-    if reference is None:
-        one = corners[:, 1] + corners[:, 2] - corners[:, 0] - corners[:, 3]
-        two = corners[:, 2] + corners[:, 3] - corners[:, 0] - corners[:, 1]
-        middle = middle_axis((one, two))
-    else:
-        middle = np.tile(reference / np.linalg.norm(reference), (len(cells), 1))
+    one = corners[:, 1] + corners[:, 2] - corners[:, 0] - corners[:, 3]
+    two = corners[:, 2] + corners[:, 3] - corners[:, 0] - corners[:, 1]
+    middle = middle_axis((one, two))
+    given = np.zeros_like(middle) if reference is None else np.broadcast_to(reference, middle.shape)
+    along = given.any(axis=1)
+    middle[along] = given[along] / np.linalg.norm(given[along], axis=1, keepdims=True)
     x = middle[:, None] - np.einsum("ekc,ec->ek", means, middle)[..., None] * means
     sizes = np.linalg.norm(x, axis=-1, keepdims=True)
-    if reference is not None and sizes.min() < _ALONG:
+    short = along & (sizes.min(axis=(1, 2)) < _ALONG)
+    if short.any():
         raise SceneError(
             Cause.BAD_FIELD, "the direction of layers stands on the surface of some shells", where=where,
-            value=reference.tolist(), remedy="give another direction, or split the link",
+            value=given[short][0].tolist(), remedy="give another direction, or split the link",
         )  # fmt: skip
     x /= sizes
     return as_poses(np.stack([x, np.cross(means, x), means], axis=-1), corners)
