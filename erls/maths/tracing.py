@@ -140,7 +140,7 @@ class Traced:
 
     def __pow__(self, exponent: Any) -> Any:
         if exponent != int(exponent) or exponent < 1:
-            if not self > 0.0:
+            if not self._compare(COMPARISONS.index(operator.gt), 0.0):
                 raise TypeError("such a power of no positive number")
             return 1.0 if exponent == 0 else (self._function("log") * exponent)._function("exp")
         found = self
@@ -152,7 +152,7 @@ class Traced:
         return self._function("fabs")
 
     def __bool__(self) -> bool:
-        return bool(self != 0.0)
+        return self._compare(COMPARISONS.index(operator.ne), 0.0)
 
     def __float__(self) -> float:
         raise TypeError("a number on a tape is no single value")
