@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from erls.errors import SceneError
+from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.so3 import Array
 from erls.optimization import equivalent_loads
 from erls.optimization.aggregates import Aggregates
@@ -64,15 +64,24 @@ class Way:
 def _nearer(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis], None]) -> Array:
     """A start that is far beyond its limits, brought nearer by equivalent static loads where these apply.
 
-    Soft designs vibrate so much that derivatives of their motion tell little of designs further on.
+    Soft designs vibrate so much that derivatives of their motion tell little of designs further on. What comes of it is
+    the analysed design that is beyond its limits the least: a proposal that cannot run ends the search, not the method.
     """
     try:
         equivalent_loads.refuse(dynamics, "esl-system")
     except SceneError:
         return x
     settings, span, change = dynamics.problem.record.settings, dynamics.rules.upper - dynamics.rules.lower, np.inf
+    best, least = x, np.inf
     for _ in range(min(_LOADED, settings.most_analyses - 1)):
-        found, motion = dynamics.analysed(x)
+        try:
+            found, motion = dynamics.analysed(x)
+        except SimulationError as problem:
+            if problem.cause == Cause.INTERRUPTED or least == np.inf:
+                raise
+            break
+        if found.violation < least:
+            best, least = x, found.violation
         if found.violation <= _FAR:
             break
         way.history.append(Analysis(x, found.objective, found.violation, change))
@@ -82,7 +91,7 @@ def _nearer(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis], N
         way.inner += loads.evaluations
         way.history[-1] = replace(way.history[-1], inner=loads.evaluations)
         change, x = relative_change(x, inner.next, span), inner.next
-    return x
+    return best
 
 
 def integrated(dynamics: Dynamics, x: Array, way: Way, told: Callable[[Analysis], None]) -> None:

@@ -142,8 +142,8 @@ def stored(
 
 
 @part
-def _add_blocks(model: Model, work: Work, kind: int, change: Array, out: Array) -> None:
-    """out += the sum of all blocks of a kind, times a change of the nodes."""
+def add_blocks(model: Model, work: Work, kind: int, back: bool, x: Array, out: Array) -> None:
+    """out += the sum of all blocks of a kind times a change of the nodes; ``back``: its transpose times forces."""
     for e in range(len(model.pairs)):
         block = work.blocks[e, kind]
         for side in range(2):
@@ -155,15 +155,17 @@ def _add_blocks(model: Model, work: Work, kind: int, change: Array, out: Array) 
                 if column < 0:
                     continue
                 for i in range(6):
-                    total = 0.0
                     for j in range(6):
-                        total += block[6 * side + i, 6 * other + j] * change[column + j]
-                    out[row + i] += total
+                        entry = block[6 * side + i, 6 * other + j]
+                        if back:
+                            out[column + j] += entry * x[row + i]
+                        else:
+                            out[row + i] += entry * x[column + j]
 
 
 @part
-def _add_conditions(model: Model, work: Work, change: Array, out: Array) -> None:
-    """out[n:] += B times a change of the nodes."""
+def add_conditions(model: Model, work: Work, back: bool, x: Array, out: Array) -> None:
+    """out[n:] += B times a change of the nodes; ``back``: out += Bᵀ times x[n:]."""
     n = len(work.force)
     for j in range(len(model.joint_nodes)):
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
@@ -171,7 +173,11 @@ def _add_conditions(model: Model, work: Work, change: Array, out: Array) -> None
                 column = 6 * model.joint_nodes[j, side]
                 if column >= 0:
                     for i in range(6):
-                        out[n + row] += work.gradient[row, 6 * side + i] * change[column + i]
+                        entry = work.gradient[row, 6 * side + i]
+                        if back:
+                            out[column + i] += entry * x[n + row]
+                        else:
+                            out[n + row] += entry * x[column + i]
 
 
 @part
@@ -217,9 +223,9 @@ def _step(
     _carried(work, change[PLACE], ahead, place)
     for i in range(n + m):
         right[i] = slopes[i]
-    _add_blocks(model, work, 1, rate, right)
-    _add_blocks(model, work, 2, place, right)
-    _add_conditions(model, work, place, right)
+    add_blocks(model, work, 1, False, rate, right)
+    add_blocks(model, work, 2, False, place, right)
+    add_conditions(model, work, False, place, right)
     for i in range(n):
         right[i] *= -1.0 / to_a
     for k in range(n, n + m):

@@ -37,6 +37,8 @@ from erls.sensitivity.nodal_kernels import (
     PULL,
     RATE,
     SHARE,
+    add_blocks,
+    add_conditions,
     evaluate,
 )
 
@@ -68,37 +70,6 @@ def _solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     solve_transposed(room.band, room.pivots, room.ordered)
     for i in range(len(order)):
         b[order[i]] = room.left[order[i]] * room.ordered[i]
-
-
-@part
-def _add_blocks(model: Model, work: Work, kind: int, forces: Array, out: Array) -> None:
-    """out += the transposed sum of all blocks of a kind, times forces on the nodes."""
-    for e in range(len(model.pairs)):
-        block = work.blocks[e, kind]
-        for side in range(2):
-            row = 6 * model.pairs[e, side]
-            if row < 0:
-                continue
-            for other in range(2):
-                column = 6 * model.pairs[e, other]
-                if column < 0:
-                    continue
-                for i in range(6):
-                    for j in range(6):
-                        out[column + j] += block[6 * side + i, 6 * other + j] * forces[row + i]
-
-
-@part
-def _add_conditions(model: Model, work: Work, forces: Array, out: Array) -> None:
-    """out += Bᵀ times forces[n:]."""
-    n = len(work.force)
-    for j in range(len(model.joint_nodes)):
-        for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
-            for side in range(2):
-                column = 6 * model.joint_nodes[j, side]
-                if column >= 0:
-                    for i in range(6):
-                        out[column + i] += work.gradient[row, 6 * side + i] * forces[n + row]
 
 
 @part
@@ -154,9 +125,9 @@ def _step_back(
     rate = by[RATE]
     for i in range(n):
         place[i] = by[PLACE, i]
-    _add_blocks(model, work, 1, out, rate)
-    _add_blocks(model, work, 2, out, place)
-    _add_conditions(model, work, out, place)
+    add_blocks(model, work, 1, True, out, rate)
+    add_blocks(model, work, 2, True, out, place)
+    add_conditions(model, work, True, out, place)
     _carried_back(work, place, True, by[PLACE])
     _carried_back(work, place, False, ahead)
     for i in range(n):
