@@ -7,9 +7,10 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -26,7 +27,7 @@ from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
-from erls.equations.nodal.parts import BeamRules, link_parts
+from erls.equations.nodal.parts import BeamRules, LinkParts, link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
@@ -58,6 +59,8 @@ class Nodal:
         So many elements in place of each.
     rules : BeamRules
         How beams become elements.
+    known : sequence of LinkParts or None
+        Of the links, as far as they are made already.
 
     Raises
     ------
@@ -72,9 +75,14 @@ class Nodal:
         start: ClosedStart | None = None,
         times: int = 1,
         rules: BeamRules = BeamRules(),  # noqa: B008  (frozen)
+        known: Sequence[LinkParts | None] = (),
     ) -> None:
         self.mechanism, self._elements, self._start, self._rules = mechanism, elements_per_member, start, rules
-        parts = [link_parts(link, elements_per_member, times, rules) for link in mechanism.links]
+        parts = [
+            made or link_parts(link, elements_per_member, times, rules)
+            for made, link in zip_longest(known, mechanism.links)
+        ]
+        self._parts, self._times = parts, times
         self._built = [part.nodes for part in parts]  # in the mesh frames
         self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
@@ -99,7 +107,9 @@ class Nodal:
         """The same of a mechanism whose links have other sections or materials, and nodes and interfaces where they are
         here: loops begin as they do here.
         """
-        return Nodal(mechanism, self._elements, self._start, rules=self._rules)
+        pairs = zip(mechanism.links, self.mechanism.links, self._parts, strict=True)
+        known = [part if link is own and self._times == 1 else None for link, own, part in pairs]
+        return Nodal(mechanism, self._elements, self._start, rules=self._rules, known=known)
 
     @cached_property
     def _arms(self) -> list[tuple[int, int, Array]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
@@ -151,20 +152,25 @@ def band_order(count: int, pairs: IntArray, rows: JointRows) -> tuple[IntArray, 
     E. Cuthill, J. McKee, Proc. 24th Nat. Conf. ACM (1969) 157–172.
     """
     joints = len(rows.joints)
-    groups = [pair[pair >= 0] for pair in pairs]
-    groups += [np.append(pair[pair >= 0], count + k) for k, pair in enumerate(rows.nodes)]
-    along = np.concatenate([np.zeros(0, dtype=np.int64), *(np.repeat(g, len(g)) for g in groups)])
-    across = np.concatenate([np.zeros(0, dtype=np.int64), *(np.tile(g, len(g)) for g in groups)])
-    graph = sp.csr_array((np.ones(len(along)), (along, across)), shape=(count + joints, count + joints))
-    of_joints = np.bincount(rows.joint_of_row, minlength=joints)
-    sizes = np.concatenate([np.full(count, 6), of_joints]).astype(np.int64)
-    own = np.concatenate([[0], np.cumsum(sizes)])
+    groups = [*pairs, *(np.append(pair, count + k) for k, pair in enumerate(rows.nodes))]
+    of_joints = np.bincount(rows.joint_of_row, minlength=joints).tolist()
+    return _ordered(tuple(tuple(g[g >= 0].tolist()) for g in groups), (*count * [6], *of_joints))
+
+
+@lru_cache(maxsize=16)
+def _ordered(groups: tuple[tuple[int, ...], ...], sizes: tuple[int, ...]) -> tuple[IntArray, int]:
+    """Of unknowns in blocks of these sizes, all in each group together; systems of other constants have the same."""
+    along = np.array([i for g in groups for i in g for _ in g], dtype=np.int64)
+    across = np.array([j for g in groups for _ in g for j in g], dtype=np.int64)
+    graph = sp.csr_array((np.ones(len(along)), (along, across)), shape=(len(sizes), len(sizes)))
+    own = np.cumsum([0, *sizes])
     places = np.zeros(own[-1], dtype=np.int64)
     last = 0
     for block in reverse_cuthill_mckee(graph, symmetric_mode=True):
         places[own[block] : own[block + 1]] = np.arange(last, last + sizes[block])
         last += sizes[block]
-    spans = [np.concatenate([places[own[b] : own[b + 1]] for b in g]) for g in groups]
+    places.setflags(write=False)
+    spans = [np.concatenate([places[own[b] : own[b + 1]] for b in g]) for g in groups if g]
     return places, max((int(np.ptp(s)) for s in spans if len(s)), default=5)
 
 

@@ -101,7 +101,8 @@ def link_parts(link: Link, elements: int | None, times: int, rules: BeamRules = 
         raise refused(what, where, "solid, or reduced elsewhere", remedy)
     frame = link.description.frame
     parts = frame_parts(link.description, frame, where, elements, times)
-    own = frame_parts(link.description, frame, where).mesh
+    same = elements is None and times == 1
+    own = parts.mesh if same else frame_parts(link.description, frame, where).mesh
     places = _places(own, parts.mesh)
     return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places, rules), *places)
 
