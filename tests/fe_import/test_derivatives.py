@@ -58,7 +58,8 @@ def _complex_slopes(link: LinkFile, key: str) -> tuple[np.ndarray, np.ndarray]:
         if key == WIDTH:
             b, h = 0.01 + 1j * tiny, 0.01
             k = element.section.shear_factor_y
-            turning = b * h**3 * (1 / 3 - 64 / np.pi**5 * h / b * sum(np.tanh(n * np.pi * b / h / 2) / n**5 for n in ODD))
+            series = sum(np.tanh(n * np.pi * b / h / 2) / n**5 for n in ODD)
+            turning = b * h**3 * (1 / 3 - 64 / np.pi**5 * h / b * series)
             own: Any = SectionConstants(b * h, b * h**3 / 12, b**3 * h / 12, turning, k, k)  # type: ignore[arg-type]
             elements.append(replace(element, section=own))
         else:
