@@ -32,6 +32,7 @@ from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.seat import Seat
+from erls.equations.nodal.shell_stress import link_stress
 from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
 from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
@@ -84,6 +85,7 @@ class Nodal:
         ]
         self._parts, self._times = parts, times
         self._built = [part.nodes for part in parts]  # in the mesh frames
+        self._stressed = [link_stress(part, link.model) for part, link in zip(parts, mechanism.links, strict=True)]
         self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
         self.views = [
@@ -98,6 +100,13 @@ class Nodal:
         self._kept = self._frames + len(self.system.model.actuators)
         free = [k for k, loop in enumerate(mechanism.loops) if loop.freedom is not None]
         self._moving = {k: len(mechanism.joints) + n for n, k in enumerate(free)}  # numbers of actuators of loops
+
+    def surface_stress(self, link: int, y: Array, v: Array) -> Array | None:
+        """See `erls.equations.formulation.SurfaceStressed`."""
+        where, own = self._stressed[link], self.chain.nodes[link]
+        if where is None:
+            return None
+        return np.array([where.at(self.configuration(*state)[0].poses[own]) for state in zip(y, v, strict=True)])
 
     def refined(self, times: int) -> Nodal:
         """The same with so many elements in place of each."""

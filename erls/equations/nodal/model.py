@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from erls.equations.nodal.actuators import Actuators
 from erls.equations.nodal.beam import Beams
 from erls.equations.nodal.contacts import Contacts
 from erls.equations.nodal.contract import Factors, Model, Work
 from erls.equations.nodal.elements import Elements
+from erls.equations.nodal.elimination import Elimination
 from erls.equations.nodal.joints import JointRows
 from erls.equations.nodal.loads import NodalLoads
 from erls.equations.nodal.nodes import rows_of
@@ -51,8 +49,14 @@ class Kinds:
         sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, self.contacts, self.shells]
         return np.concatenate([_pairs(e.nodes) for e in [*sets, *self.springs, *self.windings]])
 
+    @property
+    def heavy(self) -> IntArray:
+        """Nodes that resist every acceleration, with stiffness at least."""
+        of_bodies = self.bodies.nodes[:, 0][np.linalg.eigvalsh(self.bodies.matrices)[:, 0] > 0]
+        return np.unique(np.concatenate([of_bodies, self.beams.nodes[self.beams.moving > 0].ravel()]))
 
-def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, places: IntArray) -> Model:
+
+def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, own: Elimination) -> Model:
     """All constants.
 
     Parameters
@@ -63,8 +67,7 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         SE(3), or R³×SO(3).
     metres : (n,) array
         Per unit of each velocity.
-    places : (N,) array
-        Of all unknowns in the band, from `band_order`.
+    own : Elimination
     """
     beams, bodies, loads, actuators = kinds.beams, kinds.bodies, kinds.loads, kinds.actuators
     frames = [_frames(a.inner_frames, a.outer_frames) for a in actuators]
@@ -110,8 +113,13 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         pitches=rows.pitches,
         released=np.zeros(len(rows.names)),
         metres=metres,
-        place=places,
-        order=np.argsort(places).astype(np.int64),
+        place=own.place,
+        order=np.argsort(own.place).astype(np.int64),
+        band=own.width,
+        fronts=own.fronts,
+        front_of=own.front_of,
+        later=own.later,
+        into=own.into,
     )
 
 
@@ -138,40 +146,11 @@ def room(model: Model) -> Work:
     return Work(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
-def factor_room(model: Model, width: int) -> Factors:
-    """Memory for a factored iteration matrix in a band of this width."""
+def factor_room(model: Model, own: Elimination) -> Factors:
+    """Memory for a factored iteration matrix."""
     m, unknowns = len(model.conditions), len(model.place)
-    of_rows, per_condition = (unknowns,), (m,)
-    shapes = per_condition, per_condition, of_rows, of_rows, of_rows, (unknowns, 3 * width + 1), of_rows
-    return Factors(*map(np.zeros, shapes))
-
-
-def band_order(count: int, pairs: IntArray, rows: JointRows) -> tuple[IntArray, int]:
-    """Numbers of all unknowns in the band, nodes and joints by the reverse Cuthill-McKee order; width of the band.
-
-    E. Cuthill, J. McKee, Proc. 24th Nat. Conf. ACM (1969) 157–172.
-    """
-    joints = len(rows.joints)
-    groups = [*pairs, *(np.append(pair, count + k) for k, pair in enumerate(rows.nodes))]
-    of_joints = np.bincount(rows.joint_of_row, minlength=joints).tolist()
-    return _ordered(tuple(tuple(g[g >= 0].tolist()) for g in groups), (*count * [6], *of_joints))
-
-
-@lru_cache(maxsize=16)
-def _ordered(groups: tuple[tuple[int, ...], ...], sizes: tuple[int, ...]) -> tuple[IntArray, int]:
-    """Of unknowns in blocks of these sizes, all in each group together; systems of other constants have the same."""
-    along = np.array([i for g in groups for i in g for _ in g], dtype=np.int64)
-    across = np.array([j for g in groups for _ in g for j in g], dtype=np.int64)
-    graph = sp.csr_array((np.ones(len(along)), (along, across)), shape=(len(sizes), len(sizes)))
-    own = np.cumsum([0, *sizes])
-    places = np.zeros(own[-1], dtype=np.int64)
-    last = 0
-    for block in reverse_cuthill_mckee(graph, symmetric_mode=True):
-        places[own[block] : own[block + 1]] = np.arange(last, last + sizes[block])
-        last += sizes[block]
-    places.setflags(write=False)
-    spans = [np.concatenate([places[own[b] : own[b + 1]] for b in g]) for g in groups if g]
-    return places, max((int(np.ptp(s)) for s in spans if len(s)), default=5)
+    sizes = m, m, unknowns, unknowns, unknowns, own.entries, own.stack, unknowns
+    return Factors(*map(np.zeros, sizes))
 
 
 def _all(elements: Sequence[Elements], kind: type[E]) -> list[E]:

@@ -46,6 +46,8 @@ class LinkParts:
         Where the nodes of the modal model lie: beam, and share of its length. Empty for other links.
     shells : list of Shell
         Corners in the mesh frame.
+    corners : (q, 4) int array
+        Which nodes of the mesh these are, as many nodes of the modal model first as there are.
     carriers : (n,) int array
         Of a link of shells the node that each node of the modal model goes with.
     """
@@ -56,6 +58,7 @@ class LinkParts:
     elements: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     fractions: Array = field(default_factory=lambda: np.zeros(0))
     shells: list[Shell] = field(default_factory=list)
+    corners: IntArray = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
     carriers: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
