@@ -126,6 +126,6 @@ def sequential_convex(
         size = np.maximum(np.abs(current.x), 1e-3 * span)
         gone = (trial.x - current.x) / size
         turned = (gone * before < 0) & (before * earlier < 0)
-        moves = np.where(turned, np.maximum(_TURNED * np.abs(gone), _SMALLEST), moves * _LONGER)
+        moves = np.where(turned, np.maximum(_TURNED * np.abs(gone), settings.design_tolerance), moves * _LONGER)
         moves, earlier, before = np.minimum(moves, settings.move_limit), before, gone
         current = trial
