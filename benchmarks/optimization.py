@@ -1,18 +1,19 @@
 """Published robots and what comes out here, side by side: objective, diameters, analyses, processor time, more starts.
 
-    python benchmarks/optimization.py [--starts N] [--optimizers] [--derivatives] [PROBLEM ...]
+    python benchmarks/optimization.py [--starts N] [--optimizers] [--derivatives] [--models] [PROBLEM ...]
 
 All three methods are shown of every problem, with the processor time that each takes once compiled, confirmations
 apart. With --starts every method begins N times, first from 50 mm, then from diameters drawn between the bounds; times
-are then the mean of these. With
---optimizers SciPy's methods are shown beside sequential convex programming. Deflections and stresses of the published
-designs and of ours are those at every step. With --derivatives those of aggregates are held against central differences
-of runs, where a problem asks for them, at its start.
+are then the mean of these. With --optimizers SciPy's methods are shown beside sequential convex programming.
+Deflections and stresses of the published designs and of ours are those at every step. With --derivatives those of
+aggregates are held against central differences of runs, where a problem asks for them, at its start. With --models the
+second application is solved with other elements, masses, starts and formulations.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
 from pathlib import Path
 
@@ -30,6 +31,17 @@ from erls.report.tables import table
 DATA = Path(__file__).parents[1] / "data" / "optimization"
 PUBLISHED = ("app1", "app1_inertial", "app2", "slide_robot", "four_bar")
 METHODS = ("esl-component", "esl-system", "integrated")
+_ARMS = ("upper_arm", "forearm")
+_MODAL = ("residual_bending_flexibility=false", 'inertia_interpolation="helicoidal"')
+MODELS = {
+    "that of the papers": (),
+    "four elements in each tube": ("simulation.elements_per_member=4",),
+    "lumped masses": tuple(f'links.{arm}.model.frame.mass="lumped"' for arm in _ARMS),
+    "no residual flexibility": ("simulation.residual_bending_flexibility=false",),
+    "undeformed at the start": ('initial.deformation="zero"',),
+    "modes, ERLS": tuple(f"simulation.{x}" for x in ('formulation="erls"', *_MODAL)),
+    "modes, floating frames": tuple(f"simulation.{x}" for x in ('formulation="ffr"', *_MODAL)),
+}
 WARM = ("settings.most_analyses=2", "settings.starts=1")
 
 
@@ -74,6 +86,16 @@ def looked_at(name: str, ours: dict[str, np.ndarray]) -> list[tuple[str, ...]]:
     return rows
 
 
+def models(name: str = "app2") -> list[tuple[str, ...]]:
+    """The mass of an application by equivalent static loads, with other models."""
+    rows: list[tuple[str, ...]] = []
+    for label, given in MODELS.items():
+        changes = ['settings.methods=["esl-system"]', f"set={json.dumps(given)}"]
+        (outcome,) = erls.optimize(DATA / f"{name}.toml", changes=changes, confirm=False).outcomes
+        rows.append((label, f"{outcome.mass:.4f}", str(outcome.analyses), outcome.status))
+    return rows
+
+
 def derivatives(name: str, share: float = 1e-4) -> tuple[str, ...]:
     """Of logarithms, at the start: largest difference over the largest derivative of the same value.
 
@@ -99,6 +121,7 @@ def main() -> None:
     parser.add_argument("--starts", type=int, default=1)
     parser.add_argument("--optimizers", action="store_true")
     parser.add_argument("--derivatives", action="store_true")
+    parser.add_argument("--models", action="store_true")
     asked = parser.parse_args()
     rows: list[tuple[str, ...]] = []
     again: list[tuple[str, ...]] = []
@@ -117,6 +140,9 @@ def main() -> None:
     if again:
         print("\nPublished designs and ours, at all steps\n")
         print(table(("problem", "design", "constraint", "largest", "of its limit", "at t [s]"), again))
+    if asked.models:
+        print("\nSecond application, other models\n")
+        print(table(("model", "mass [kg]", "analyses", "status"), models()))
 
 
 if __name__ == "__main__":
