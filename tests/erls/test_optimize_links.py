@@ -10,6 +10,7 @@ import scipy.linalg as la
 
 import erls
 from erls.errors import Cause, SceneError
+from erls.optimization.confirm import simulated
 from erls.optimization.dynamics import Dynamics
 from erls.optimization.eigenvalues import LargestEigenvalue
 from erls.optimization.equivalent_loads import FrozenLoads
@@ -49,10 +50,12 @@ def test_a_heavy_tip_lowers_the_frequency() -> None:
     tip = 'payloads=[{point="tip", mass=0.35}]'
     limit = 'constraints=[{type="frequency", name="f", limit=1.0}]'
     changes = [ONE, 'settings.methods=["esl-system"]', scene(tip), limit]
-    (outcome,) = erls.optimize(CANTILEVER, changes=changes).outcomes
+    found = erls.optimize(CANTILEVER, changes=changes, confirm=False)
+    (outcome,) = found.outcomes
     stiffness = 3 * E * WIDTH * outcome.x[0] ** 3 / 12
     assert np.sqrt(stiffness / (0.35 + 33 / 140 * outcome.mass)) / (2 * np.pi) == pytest.approx(1.0, rel=3e-4)
-    assert outcome.confirmed[0].values["f"] == pytest.approx(1.0, rel=1e-5)  # told in Hz
+    again = simulated(found.problem, outcome.x, lambda text: None)
+    assert again.values["f"] == pytest.approx(1.0, rel=1e-5)  # told in Hz
 
 
 @pytest.mark.parametrize(("ends", "factor"), [("cantilever", 1 / 4), ("pinned", 1.0), ("clamped", 4.0)])
@@ -73,11 +76,11 @@ def test_euler_columns(ends: str, factor: float) -> None:
 def test_tension_does_not_buckle() -> None:
     loads = 'loads=[{point="tip", force=[1.0, 0.0, 0.0]}]'
     limit = 'constraints=[{type="buckling", name="euler", limit=25.0, samples=2}]'
-    (outcome,) = erls.optimize(
-        CANTILEVER, changes=[ONE, 'settings.methods=["esl-system"]', scene(loads), limit]
-    ).outcomes
+    changes = [ONE, 'settings.methods=["esl-system"]', scene(loads), limit]
+    found = erls.optimize(CANTILEVER, changes=changes, confirm=False)
+    (outcome,) = found.outcomes
     assert outcome.x == pytest.approx([0.001])
-    assert outcome.confirmed[0].values["euler"] == np.inf
+    assert simulated(found.problem, outcome.x, lambda text: None).values["euler"] == np.inf
     assert outcome.idle == ["euler"]
 
 
@@ -323,11 +326,11 @@ def check_vibrations(path: Path, changes: list[str], power: float | None = None)
     if power is not None:
         expected = power * measure.value(found.components[0]) / problem.start[0]
         assert slopes[:, 0] == pytest.approx(expected, rel=1e-4)  # rotary inertia grows less
-    for v, way in enumerate(np.diag(problem.start)):
-        above, below = (
-            measure.value(dynamics.evaluate(problem.start + sign * 1e-4 * way).components[0]) for sign in (1, -1)
-        )
-        assert slopes[:, v] == pytest.approx((above - below) / (2e-4 * problem.start[v]), rel=1e-5)
+    way = problem.start * np.array([1.0, 0.7])[: len(problem.start)]
+    above, below = (
+        measure.value(dynamics.evaluate(problem.start + sign * 1e-4 * way).components[0]) for sign in (1, -1)
+    )
+    assert slopes @ way == pytest.approx((above - below) / 2e-4, rel=1e-5)
 
 
 def test_what_solids_do_not_vibrate() -> None:
