@@ -114,8 +114,8 @@ LOOP_KEYS = [
 ]
 LOOP_LINKS = {
     "links.coupler.model.sections.bar.width": 0.003,
-    "links.rocker.model.materials.aluminium.density": 27000.0,
-    "links.coupler.model.materials.aluminium.youngs_modulus": 7e11,
+    "links.rocker.model.materials.aluminium.density": 13000.0,
+    "links.coupler.model.materials.aluminium.youngs_modulus": 3.5e11,
 }
 ROBOT = DATA / "robot" / "two_link.toml"
 NODES = ['simulation.formulation="nodal"', "simulation.elements_per_member=2"]

@@ -187,7 +187,7 @@ class Dynamics:
         def summed(rows: Array) -> Array:
             return rows if weights is None else weights @ rows
 
-        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, weights)
+        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, self.times, weights)
         whole = whole + summed(self._of_sections(design, motion, limits, bases))
         if self.designs.moving or not flexible(self.start.scene):
             return whole, whole

@@ -90,11 +90,14 @@ def test_both_methods(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_outputs() -> None:
-    """A place, places on either side of a jump, a reaction, an angle: through the one door."""
+    """A place, places on either side of a jump, what moves there, a reaction, an angle: through the one door."""
     run = _run(ROBOT, [*COARSE, *DRIVEN, "simulation.step=2e-3"])
     outputs: Any = {
         "height": lambda run: run.position("end2", 0.0073)[2],
         "places": lambda run: run.position("end2", [0.0, 0.004, 0.01])[:, 1:],
+        "rate": lambda run: run.velocity("end2", 0.0073)[2],
+        "acceleration": lambda run: run.acceleration("end2", 0.01)[1],
+        "turning": lambda run: run.angular_velocity("end2", 0.01)[2],
         "moment": lambda run: run.reaction("shoulder", 0.01)[1],
         "angle": lambda run: run.joint_angle("shoulder", 0.01),
     }

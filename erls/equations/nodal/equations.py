@@ -23,6 +23,7 @@ from erls.equations.neighbours import small_motions
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.chain import Chain, build_chain
 from erls.equations.nodal.grips import nodal_grips
+from erls.equations.nodal.link_motion import nodal_motion
 from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
@@ -36,6 +37,7 @@ from erls.equations.nodal.shell_stress import link_stress
 from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
 from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
+from erls.equations.serial.motion_series import MotionSeries
 from erls.equations.serial.state_series import StateSeries
 from erls.equations.stability import LARGEST, Stability, stability_of
 from erls.equations.switches.grips import Grips
@@ -286,6 +288,10 @@ class Nodal:
                 rates[n, k : k + 3] = rotations.tangent_inverse(psi) @ self.chain.seats[k].spin(q, velocity)
         frames, modal = [x.frame for x in found], [x.modal for x in found]
         return StateSeries(t, frames, modal, angles, angles, rates, [x.nodes for x in found], [x.turns for x in found])
+
+    def motion_series(self, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+        """Motion at times (k,)."""
+        return nodal_motion(self, self.views, self.system.count, t, y, v, a)
 
     def energy(self, t: float, y: Array, v: Array) -> Energy:
         """Energies of a state."""

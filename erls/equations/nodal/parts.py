@@ -28,7 +28,7 @@ from fe_import.models.frame import FrameMesh
 from fe_import.models.frame_parts import FrameParts, frame_parts
 
 STIFF_SHEAR = 1e4  # shear then counts 1e-7 of the bending of a slender member
-_SAME = 1e-9
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -121,7 +121,7 @@ def _places(own: FrameMesh, mesh: FrameMesh) -> tuple[IntArray, Array]:
     for before, after in zip(own.members, mesh.members, strict=True):
         chain = [own.elements[before[0]].nodes[0], *(own.elements[e].nodes[1] for e in before)]
         along = np.linspace(0.0, len(after), len(chain))
-        within = np.clip(np.floor(along + _SAME), 0, len(after) - 1).astype(np.int64)
+        within = np.clip(np.floor(along + SAME), 0, len(after) - 1).astype(np.int64)
         elements[chain], fractions[chain] = after[0] + within, along - within
     return elements, fractions
 
@@ -139,7 +139,7 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
     if not parts.beams:
         return 0
     end = round(float(parts.fractions[number]))
-    if abs(parts.fractions[number] - end) > _SAME:
+    if abs(parts.fractions[number] - end) > SAME:
         raise SceneError(
             Cause.BAD_FIELD,
             "a payload, a load or a joint sits between the nodes",
