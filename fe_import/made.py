@@ -137,9 +137,7 @@ def link_from_matrices(
     given = {"format": "arrays", "files": {}, "nodes": numbers}
     description = described({**(options or {}), "name": name, "interfaces": tables, "matrices": given}, _ARRAYS)
     export = _export(stiffness, mass, places, dof_map, sets)
-    model = export_model(export, description, _ARRAYS)
-    model = to_si(add_masses(model, description.masses, _ARRAYS), description, _ARRAYS)
-    return reduce_model(model, LinkFile(Path(_ARRAYS), description, content_of(model)))
+    return reduced(export_model(export, description, _ARRAYS), description, _ARRAYS)
 
 
 def _export(stiffness: Any, mass: Any, places: Any, dof_map: Any, sets: Mapping[str, Any]) -> Any:
@@ -183,7 +181,13 @@ def described(data: dict[str, Any], where: str) -> LinkDescription:
     return description
 
 
-def content_of(model: FEModel) -> bytes:
+def reduced(model: FEModel, description: LinkDescription, where: str) -> ModalModel:
+    """A model in memory reduced as its description says, its masses and units included."""
+    model = to_si(add_masses(model, description.masses, where), description, where)
+    return reduce_model(model, LinkFile(Path(where), description, _content(model)))
+
+
+def _content(model: FEModel) -> bytes:
     """What a link depends on that no file holds."""
     digest = hashlib.sha256(np.ascontiguousarray(model.nodes).tobytes())
     for matrix in (model.mass, model.stiffness):

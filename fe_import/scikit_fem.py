@@ -3,20 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fe_import.description.link import LinkFile
 from fe_import.description.records import LinkDescription
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
-from fe_import.made import content_of, described
+from fe_import.made import described, reduced
 from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
-from fe_import.models.model import add_masses, to_si
-from fe_import.reduce import reduce_model
 
 _WHERE = "link_from_skfem"
 
@@ -104,8 +100,7 @@ def link_from_skfem(
 
         named = mesh.with_boundaries(facets) if facets else mesh
         model = mesh_model(solid_mesh(named, _WHERE), description, _WHERE)
-    model = to_si(add_masses(model, description.masses, _WHERE), description, _WHERE)
-    return reduce_model(model, LinkFile(Path(_WHERE), description, content_of(model)))
+    return reduced(model, description, _WHERE)
 
 
 def _fault(message: str, value: Any) -> FEImportError:

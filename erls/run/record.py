@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.so3 import Array
 from erls.run.accuracy import Accuracy, Trust
+from erls.run.animation import animate
 from erls.run.tables import data_frame, dataset, plot
 from erls.scene.records import SceneFile
 
@@ -168,6 +169,31 @@ class Run(ABC):
             TIME_OUT_OF_RANGE; BAD_REFERENCE: a name that the table does not have.
         """
         return plot(self, names, times, axes)
+
+    def animate(self, *points: str, times: ArrayLike | None = None, speed: float = 1.0) -> Any:
+        """Its points moving in space, by matplotlib; `erls.write_view` makes films with links in their shapes.
+
+        In notebooks ``HTML(run.animate().to_jshtml())`` plays it, elsewhere ``.save("run.gif")`` keeps it.
+
+        Parameters
+        ----------
+        *points : str
+            Names, patterns such as ``end*`` too; all unless given.
+        times : array_like, optional
+            Values of the axis, a picture each; up to 101 even ones unless given.
+        speed : float
+            How many times faster than it was.
+
+        Returns
+        -------
+        matplotlib.animation.FuncAnimation
+
+        Raises
+        ------
+        SceneError
+            TIME_OUT_OF_RANGE; BAD_REFERENCE: a point that is not there; BAD_FIELD.
+        """
+        return animate(self, points, times, speed)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Copies and pickles hold the bytes of a run file."""

@@ -16,6 +16,7 @@ import numpy as np
 import pytest
 from body_scenes_data import STRIP, body_scene
 from matplotlib.figure import Figure
+from PIL import Image
 from scenes import ROOT
 
 import erls
@@ -151,9 +152,34 @@ def test_plots_show_what_is_asked(runs: dict[str, Run]) -> None:
     assert refused.value.cause == Cause.BAD_REFERENCE
 
 
+def test_points_move(runs: dict[str, Run], tmp_path: Path) -> None:
+    """A picture for each time, at the speed that is asked; each shows where points are, and their ways."""
+    run = runs["chain"]
+    moving = run.animate("end*", times=TIMES, speed=0.1)
+    moving.save(tmp_path / "run.gif", writer="pillow")
+    with Image.open(tmp_path / "run.gif") as film:
+        assert film.n_frames == len(TIMES)
+    assert moving._interval == pytest.approx(1e3 * TIMES[-1] / 2 / 0.1)
+    (axes,) = moving._fig.axes
+    way, *_, mark = axes.get_lines()
+    places = run.position(mark.get_label(), TIMES)
+    assert (np.stack(mark.get_data_3d(), axis=1) == places[-1:]).all()
+    assert (np.stack(way.get_data_3d(), axis=1) == run.position(run.point_names[0], TIMES)).all()
+    assert f"{TIMES[-1]:.4g} s" in axes.get_title()
+    with pytest.raises(SceneError, match=r"elbo.*end1"):
+        run.animate("elbo")
+    with pytest.raises(SceneError, match="speed is positive"):
+        run.animate(speed=0.0)
+
+
 @pytest.mark.parametrize(
     ("name", "method", "extra"),
-    [("pandas", "to_pandas", "tables"), ("xarray", "to_xarray", "tables"), ("matplotlib", "plot", "plot")],
+    [
+        ("pandas", "to_pandas", "tables"),
+        ("xarray", "to_xarray", "tables"),
+        ("matplotlib", "plot", "plot"),
+        ("matplotlib", "animate", "plot"),
+    ],
 )
 def test_a_package_that_is_not_there_is_named(
     name: str, method: str, extra: str, runs: dict[str, Run], monkeypatch: pytest.MonkeyPatch

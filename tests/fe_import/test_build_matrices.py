@@ -161,7 +161,7 @@ def test_solids_with_reference_nodes(tmp_path: Path) -> None:
 
 
 def test_averaged_faces(tmp_path: Path) -> None:
-    """The interface node of an averaged face, named in any case, is in its middle and passes rigid motion on exactly."""
+    """The interface node of an averaged face, in any case, is in its middle and passes rigid motion exactly."""
     averaged = [{"name": n, "face": f, "coupling": "averaged"} for n, f in (("hub", "x0"), ("hand", "X1"))]
     model = build_model(written(tmp_path, {**MARKET, "interfaces": averaged}))
     assert [i.coupling for i in model.interface_nodes] == ["averaged", "averaged"]
