@@ -97,12 +97,12 @@ def problem_of(scene: Scene, tell: Message = lambda text: None) -> Problem:
     if len(drives) > len(conditions.every):
         tell("finding the motion of least effort")
         held = conditions
-        conditions, settled = of_least_effort(held, partial(_rigid, scene, bare, drives=drives))
+        conditions, settled = of_least_effort(held, partial(of_rigid_links, scene, bare, drives=drives))
         spare = ", ".join(each.name for each in conditions.every[len(held.every) :])
         far = "" if settled else ", as far as the search for it came"
         warnings = (*warnings, f"{spare}: moved for the least effort of rigid links{far}")
-    flexible = _servoed(scene, free, conditions, drives)
-    stiff = _rigid(scene, bare, conditions, drives)
+    flexible = servoed_of(scene, free, conditions, drives)
+    stiff = of_rigid_links(scene, bare, conditions, drives)
     t = _knots(scene, flexible.tree.size)
     names = tuple(mechanism.joints[k].name for k in drives.tolist())
     return Problem(scene, mechanism, conditions, names, flexible, stiff, t, warnings)
@@ -162,24 +162,25 @@ def with_drives(mechanism: Mechanism, drives: dict[int, Drive]) -> Mechanism:
     return replace(mechanism, joints=tuple(joints), static_start=False)
 
 
-def _servoed(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: IntArray) -> Servoed:
+def servoed_of(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: IntArray) -> Servoed:
+    """A mechanism, whose unknown drives (r,) are at rest, with conditions."""
     settings = scene.record.simulation
     closing = Closing(ClosedChain(TREES[settings.formulation](mechanism, settings))) if mechanism.loops else None
     return Servoed(_tree(scene, mechanism, conditions), conditions, drives, closing)
 
 
-def _rigid(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: IntArray) -> Servoed:
+def of_rigid_links(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: IntArray) -> Servoed:
     """Of rigid links, with the joints held that neither are driven nor close loops."""
     moving = set(drives.tolist())
     if mechanism.loops:
-        closed = _servoed(scene, mechanism, conditions, drives)
+        closed = servoed_of(scene, mechanism, conditions, drives)
         moving |= set(closed.tree.free_joints[closed.dependent].tolist())
     held = {
         k: Drive("motion", motion=joint.drive.motion or piecewise([], [joint.position]))
         for k, joint in enumerate(mechanism.joints)
         if not joint.drive.prescribed and k not in moving
     }
-    return _servoed(scene, with_drives(mechanism, held), conditions, drives)
+    return servoed_of(scene, with_drives(mechanism, held), conditions, drives)
 
 
 def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialFormulation:

@@ -27,7 +27,7 @@ from erls.equations.tangents import Evaluation, Knots, Tangents, steps_of
 from erls.errors import Cause, SimulationError
 from erls.inverse.closing import Closing, following
 from erls.inverse.conditions import Conditions, Demand, Held, Joints
-from erls.inverse.frames import point_motions
+from erls.inverse.frames import PointMotion, point_motions
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
@@ -162,11 +162,14 @@ class Servoed:
             angles[:, k], rates[:, k], accelerations[:, k] = found.T
         return Joints(angles, rates, accelerations, np.eye(tree.joints, tree.size)[np.argsort(np.r_[free, other])])
 
+    def points(self, t: Array, y: Array, v: Array) -> PointMotion:
+        """Those of the conditions at k states."""
+        prescribed = len(self.tree.prescribed_joints)
+        return point_motions(self.system, len(self.conditions.points), prescribed, t, y, v)
+
     def held(self, demand: Demand, y: Array, v: Array) -> Held:
         """Conditions at k states."""
-        prescribed = len(self.tree.prescribed_joints)
-        points = point_motions(self.system, len(self.conditions.points), prescribed, demand.t, y, v)
-        found = self.conditions.held(demand, points, self.joints(demand.t, y, v))
+        found = self.conditions.held(demand, self.points(demand.t, y, v), self.joints(demand.t, y, v))
         if self.closing is None:
             return found
         loops = self.closing.held(demand.t, y, v)

@@ -4,26 +4,21 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy.linalg as la
 
 from erls.equations.registry import TREES
-from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
-from erls.equations.serial.formulation import SerialFormulation
-from erls.equations.system import metre_scales
-from erls.equations.tangents import Evaluation, Knots, steps_of
 from erls.errors import Cause, SceneError
-from erls.inverse.frames import point_motions, with_ends
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.mechanism.drives import Drive
 from erls.mechanism.place import Place
 from erls.mechanism.rigid_dynamics import inverse_dynamics
 from erls.scene.build import Message, build_mechanism
 from erls.scene.chain import Scene
 from erls.tracking.laws import Law
+from erls.tracking.straight import Straight, Table, beside_end, straight
 from erls.tracking.vibration import Mode, swing
 from fe_import.model import IntArray
 
@@ -71,6 +66,8 @@ class Goal:
         Bounds; infinite without.
     modes : tuple of Mode
     beyond : Beyond
+    table : Table or None
+        Efforts of rigid links in loops.
     """
 
     scene: Scene
@@ -83,6 +80,7 @@ class Goal:
     rates: Array
     modes: tuple[Mode, ...]
     beyond: Beyond
+    table: Table | None = None
 
     @property
     def moved(self) -> Array:
@@ -103,6 +101,8 @@ class Goal:
 
     def rigid(self, place: Array, rate: Array, acceleration: Array) -> Array:
         """(k, j) those of rigid links."""
+        if self.table is not None:
+            return self.table.efforts(place, rate, acceleration)
         parts = (self.first + np.outer(place, self.change), *(np.outer(x, self.change) for x in (rate, acceleration)))
         return inverse_dynamics(self.mechanism, *parts)[:, self.joints]
 
@@ -126,8 +126,6 @@ def goal_of(scene: Scene, tell: Message = lambda text: None) -> Goal:
     if scene.record.simulation.formulation not in TREES:
         given, remedy = scene.record.simulation.formulation, f"plan with {', '.join(TREES)}, and --confirm nodal"
         raise place.error("simulation.formulation", "not one of modes", given, remedy=remedy)
-    if scene.record.loops:
-        raise place.error("loops", "a mechanism with loops cannot be planned yet", remedy="plan chains and trees")
     if not scene.record.points:
         raise place.error("points", "no point whose vibration counts", remedy="name the tip in [[points]]")
     mechanism = build_mechanism(scene, tell).mechanism
@@ -145,32 +143,21 @@ def goal_of(scene: Scene, tell: Message = lambda text: None) -> Goal:
             rates[i] = own.positive("rate", own.quantity("rate", one.rate, one.rate_deg))
     if not change.any():
         raise place.error("plan.joints", "a motion of no length", remedy="go elsewhere than where the scene starts")
-    modes = _modes(scene, mechanism, numbers, first + change, change)
+    way = straight(scene, mechanism, numbers, first[numbers], change[numbers])
+    modes = _modes(scene, way)
     beyond = Beyond(np.zeros((2, len(numbers))), np.zeros(len(modes), dtype=complex))
-    return Goal(scene, mechanism, tuple(plan.joints), numbers, first, change, efforts, rates, modes, beyond)
+    table = Table(way) if mechanism.loops else None
+    return Goal(scene, mechanism, tuple(plan.joints), numbers, first, change, efforts, rates, modes, beyond, table)
 
 
-def _modes(scene: Scene, mechanism: Mechanism, planned: IntArray, pose: Array, change: Array) -> tuple[Mode, ...]:
-    """Vibrations about a pose with planned joints held, as far as the law can make them count."""
-    joints = tuple(
-        replace(joint, position=float(pose[k]), drive=Drive() if k in planned else joint.drive)
-        for k, joint in enumerate(mechanism.joints)
-    )
-    there = replace(mechanism, joints=joints, static_start=False)
-    tree: Any = TREES[scene.record.simulation.formulation](with_ends(there, mechanism.points), scene.record.simulation)
-    assert isinstance(tree, SerialFormulation)
-    y = tree.undeformed_start()[0]
-    size, metres = size_of(mechanism) or 1.0, metre_scales(tree)
-    still = np.zeros((1, tree.size))
-    knots = Knots(np.zeros(1), y[None], still, still)
-    steps = steps_of(metres, size, elastic_on_diagonal(tree)[0])
-    mass, damping, stiffness = (x[0] for x in Evaluation(steps).tangents(tree.compiled, knots))
-    driven = np.searchsorted(tree.free_joints, planned)
-    own = np.setdiff1d(np.arange(tree.size), driven)
-    if not len(own):
+def _modes(scene: Scene, way: Straight) -> tuple[Mode, ...]:
+    """Vibrations about the end of a way with planned joints held, as far as the law can make them count."""
+    mass, damping, stiffness, ways, moves, points = beside_end(way)
+    if not ways.shape[1]:
         return ()
-    inner = np.ix_(own, own)
-    squares, shapes = la.eigh((stiffness[inner] + stiffness[inner].T) / 2, mass[inner])
+    inner = ways.T @ mass @ ways
+    bent, slowed = ways.T @ (stiffness + stiffness.T) @ ways / 2, ways.T @ damping @ ways
+    squares, shapes = la.eigh(bent, (inner + inner.T) / 2)
     if squares.min() <= _STILL**2 * squares.max():
         raise SceneError(
             Cause.BAD_FIELD,
@@ -179,12 +166,10 @@ def _modes(scene: Scene, mechanism: Mechanism, planned: IntArray, pose: Array, c
             value=f"stiffness {squares.min():.3g} 1/s² of a mode",
             remedy="plan that joint, too, or give it a spring",
         )
-    count = len(tree.prescribed_joints)
-    rows = point_motions(tree.compiled, len(mechanism.points), count, np.zeros(1), y[None], still).rows[0][:, :, own]
-    coupling = mass[np.ix_(own, driven)]
+    coupling, rows = ways.T @ mass @ moves, points @ ways
     found = []
     for square, shape in zip(squares, shapes.T, strict=True):
         omega = float(np.sqrt(square))
-        ratio = min(float(shape @ damping[inner] @ shape) / (2 * omega), 0.99)
-        found.append(Mode(omega, ratio, float(shape @ coupling @ change[planned]), rows @ shape, coupling.T @ shape))
+        ratio = min(float(shape @ slowed @ shape) / (2 * omega), 0.99)
+        found.append(Mode(omega, ratio, float(shape @ coupling @ way.change), rows @ shape, coupling.T @ shape))
     return tuple(mode for mode in found if mode.most > _LEAST * scene.record.plan.swing)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 import scenes
@@ -10,6 +12,7 @@ import erls
 from erls.cli.main import main
 from erls.errors import SceneError
 from erls.inverse.inversion import Inversion
+from erls.inverse.nodal import two_point
 from erls.tracking.confirm import confirmed
 
 INVERSE = scenes.ROOT / "data" / "inverse"
@@ -79,3 +82,25 @@ def test_more_steps_than_memory_are_refused() -> None:
     """Of many elements, although modes have room."""
     with pytest.raises(SceneError, match="elements_per_member"):
         found("arm", NODAL, "simulation.elements_per_member=200", "links.0.elastic_modes=1", "simulation.step=0.04")
+
+
+def test_factors_that_are_kept_change_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Newton's method with factors of its own in each step, and with those of a step before: the same to rounding, and
+    one factorization for all steps where the first guess is as near as that of rigid links.
+    """
+    factored: list[int] = []
+    plain = two_point.splu
+
+    def counted(matrix: Any) -> Any:
+        factored[-1] += 1
+        return plain(matrix)
+
+    monkeypatch.setattr(two_point, "splu", counted)
+    ran = []
+    for slow in (0.0, 0.1):
+        monkeypatch.setattr(two_point, "_SLOW", slow)
+        factored.append(0)
+        ran.append(found("passive_arm", NODAL, "simulation.step=0.05"))
+    np.testing.assert_allclose(ran[1].efforts["hub"], ran[0].efforts["hub"], atol=1e-9)
+    assert factored[0] == ran[0].iterations
+    assert factored[1] < ran[1].iterations
