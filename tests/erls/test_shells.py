@@ -236,26 +236,21 @@ def test_a_strip_swings_and_vibrates_as_beams_do(tmp_path: Path) -> None:
 
 
 def test_a_plate_keeps_its_momentum_in_flight() -> None:
-    """On R3xSO(3) to 1e-10 of it; what turns it and its place to second order in the step; energy within 1 % once the
-    force is gone (ours, of three steps a period of the first modes alone).
-    """
-    runs = []
-    for step in (1e-3, 5e-4, 2.5e-4):
-        coarse = ["shells.0.elements=[2,2]", "simulation.duration=0.05", f"simulation.step={step}"]
+    """On R3xSO(3) the impulse of the force, and to rounding; its energy swings by a quarter of half the step."""
+    swings = []
+    for step in (2.5e-4, 1.25e-4):
+        coarse = ["shells.0.elements=[2,2]", "simulation.duration=0.04", f"simulation.step={step}"]
         scene = erls.load_scene(ROOT / "data/shells/plate.toml", [*coarse, "simulation.group=R3xSO(3)"])
         run = erls.simulate(scene, verdict=False)
         assert isinstance(run, BodyMotion)
-        assert run.solution.halved.steps == 0
-        first, last = momenta(run, [0.03, 0.05])
-        size = float(np.linalg.norm(first[:3]))
-        assert size == pytest.approx(np.hypot(0.02, 0.08), rel=2e-3)  # the impulse
-        assert np.abs(last[:3] - first[:3]).max() < 1e-10 * size
-        assert np.abs(last[3:] - first[3:]).max() < 1e-3 * np.abs(first[3:]).max()
+        first, last = momenta(run, [0.03, 0.04])
+        np.testing.assert_allclose(first[:3], [0.02, 0.0, 0.08], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(last[:3], first[:3], rtol=0, atol=1e-12)
+        assert np.abs(last[3:] - first[3:]).max() < 1e-6 * np.abs(first[3:]).max()
         t, energy = run.energies()[:2]
-        assert np.ptp(energy[t > 0.03]) < 0.01 * energy[-1]
-        runs.append(run.position("c", 0.05))
-    ratio = np.linalg.norm(runs[0] - runs[1]) / np.linalg.norm(runs[1] - runs[2])
-    assert ratio == pytest.approx(4.0, abs=0.6)
+        swings.append(np.ptp(energy[t > 0.03]) / energy[-1])
+    assert swings[0] < 5e-4
+    assert swings[0] / swings[1] == pytest.approx(4.0, abs=0.2)
 
 
 def test_mass_and_folds() -> None:
