@@ -1,17 +1,20 @@
-"""Shells beside published figures, and a bracket beside solids and CalculiX.
+"""Shells beside published figures, closed forms, beams, solids and CalculiX: ours, the other, the difference.
 
-    python benchmarks/shells.py [--scenes | --roll-up | --right-angle | --chain] [--json FILE]
+    python benchmarks/shells.py [--NAME ...] [--json FILE]
 
-The standard set on three meshes, quadrangles and triangles of links and geometrically exact shells (`exact`, of small
-displacements), and the pre-twisted cantilever, thick and thin, with the drilling factors stated: ours / published.
-Then the first six free frequencies of a folded bracket (0.2 and 0.15 m by 0.1 m, 5 mm of aluminium, a twentieth of the
-width): shells of two meshes, hexahedra of 20 nodes about the same middle surface, CalculiX's S8R on the mesh of the
-shells where `ccx` is there.
+All tables (half an hour of one core, most of it the large displacements on fine meshes), or those that are named:
 
-With `--scenes` instead the shipped scenes of large displacements, paths included (minutes); with `--roll-up` the three
-numerical models of the slides for the strip rolled up by 360 degrees, and what else the tangents take there; with
-`--right-angle` what iteration matrices take for the right-angle cantilever over 30 s; with `--chain` a strip on a hinge
-as ERLS, FFR and nodal shells on three meshes.
+- `--standard`, `--twisted`, `--thin`, `--large`, `--paths`, `--flight`: scenes of `data/shells/`, geometrically exact
+  shells (`benchmarks/shell_figures.py`); `--patches`: constant strains on a distorted mesh, turns as rigid bodies;
+- `--links`: the shells of links, quadrangles and triangles, on the standard set and the pre-twisted cantilever with the
+  drilling factors stated: ours / published on three meshes;
+- `--bracket`: the first six free frequencies of a folded bracket (0.2 and 0.15 m by 0.1 m, 5 mm of aluminium, a
+  twentieth of the width): shells of two meshes, hexahedra of 20 nodes about the same middle surface, CalculiX's S8R on
+  the mesh of the shells where `ccx` is there;
+- `--roll-up`: the three numerical models of the slides for the strip rolled up by 360 degrees, and what else the
+  tangents take there; `--right-angle`: what iteration matrices take for the right-angle cantilever over 30 s;
+- `--chain`: a strip on a hinge as ERLS, FFR and nodal shells on three meshes; `--arm-stress`: stress in the bracket of
+  `data/shells/bracket_arm.toml`, as either has it.
 """
 
 from __future__ import annotations
@@ -21,90 +24,34 @@ import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
+from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fe_import"))
-import shell_meshes
+import shell_figures
 from shell_benchmarks import PUBLISHED, TWISTED, twisted
-from shell_brackets import calculix_bracket, shell_bracket, solid_bracket
-from shell_meshes import ShellGrid
+from shell_brackets import calculix_bracket, gmsh_brackets, shell_bracket, solid_bracket
+from shell_figures import Figure
 from test_shell_chains import arm, described, strip
+from test_shells import curved, patch_errors
 
 import erls
-from erls.equations.nodal.assembly import NodalSystem
-from erls.equations.nodal.shell import Shell, Shells
-from erls.equations.nodal.surfaces import corner_frames
 from erls.errors import SimulationError
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, work
-from fe_import.elements.laminates import Laminate
+from erls.view.figures import figure_of
 
 DATA = Path(__file__).parents[1] / "data"
 MESHES = {"standard": (8, 16, 32), "twisted": ((12, 2), (24, 4), (48, 8))}
 
 
-def exact_stiffness(grid: ShellGrid, make: Laminate, drilling: float) -> sp.csc_array:
-    """Of geometrically exact shells where they are built, row 6 * node + component."""
-    poses = np.tile(np.eye(4), (len(grid.nodes), 1, 1))
-    poses[:, :3, 3] = grid.nodes
-    frames = corner_frames(grid.nodes, grid.elements, 25.0, "mesh")
-    made = [
-        Shell(tuple(map(int, cell)), frame, make.stiffness(), make.moments(), drilling)
-        for cell, frame in zip(grid.elements, frames, strict=True)
-    ]
-    system = NodalSystem(poses, [Shells(made, poses)])
-    rest = np.zeros(system.size)
-    return sp.csc_array(system.stiffness_and_damping(0.0, system.start, rest, rest, None, material=True)[0])
-
-
-def _last(run: BodyRest, point: str, axis: int) -> float:
-    built = run.origin.poses[run.assembly.numbers[point], axis, 3]
-    return abs(float(run.position(point, run.end)[axis] - built))
-
-
-def _fold(run: BodyRest, first: float) -> float:
-    """Moment of the whole width [N m]: work per rotation from a share of the load parameter on."""
-    loads = run.loads(run.times)
-    begin = int(np.flatnonzero(loads < first).max()) + 1
-    samples = run.samples(run.times[begin:].tolist())
-    moments = [sample["connections"]["turn"]["moment"][1] for sample in samples]
-    return 2 * abs(float(np.trapezoid(moments, loads[begin:]) / (loads[-1] - loads[begin])))
-
-
-_MOTION = [f"connections.0.motion.{key}" for key in ("values_deg=[-75,0,75,150]", "rates_deg=[75,75]")]
-_EQUAL = [*_MOTION, "shells.0.mesh=meshes/tape_coarse.inp", "simulation.load_steps=60"]
-SCENES: tuple[tuple[str, str, list[str], Callable[[BodyRest], float], float], ...] = (
-    ("two bars, first limit", "statics/two_bars", [], lambda run: run.statics.turns[0].t, 0.370064700095),
-    ("Lee's frame, first limit [kN]", "statics/lee_frame", [], lambda run: 30 * run.statics.turns[0].t, 18.55),
-    ("hemisphere, pulled", "shells/hemisphere", [], lambda run: _last(run, "pulled", 0), 4.067),
-    ("hemisphere, pushed", "shells/hemisphere", [], lambda run: _last(run, "pushed", 1), 8.178),
-    ("annulus, inner", "shells/annulus", [], lambda run: _last(run, "inner", 2), 13.891),
-    ("annulus, outer", "shells/annulus", [], lambda run: _last(run, "outer", 2), 17.528),
-    ("tape spring, opposite sense", "shells/tape_spring", [], lambda run: _fold(run, 30 / 90), 0.0393),
-    ("tape spring, equal sense", "shells/tape_spring", _EQUAL, lambda run: _fold(run, 95 / 150), 0.0211),
-)
 ROLL_UP = ((2, "full", 1), (2, "frozen", 2), (4, "frozen", 1), (4, "full", 1), (4, "material", 1))
 """The models of the slides, then ours: elements, tangent, load steps."""
-
-
-def scenes() -> dict[str, Any]:
-    """Shipped scenes beside what is published."""
-    found: dict[str, Any] = {}
-    print(f"{'scene':<32}{'ours':>12}{'published':>12}{'apart':>9}{'time [s]':>10}")
-    for name, file, changes, quantity, published in SCENES:
-        run = erls.simulate(erls.load_scene(DATA / f"{file}.toml", changes), verdict=False)
-        assert isinstance(run, BodyRest)
-        ours = quantity(run)
-        found[name] = {"ours": ours, "published": published, "wall_s": run.wall_s}
-        apart = f"{100 * (ours / published - 1):8.2f}%"
-        print(f"{name:<32}{ours:12.6g}{published:12.6g}{apart}{run.wall_s:10.1f}", flush=True)
-    return found
 
 
 def roll_up() -> dict[str, Any]:
@@ -180,36 +127,62 @@ def chain() -> dict[str, Any]:
     return found
 
 
-def main() -> None:
-    """Print the tables."""
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="write the figures to a file, too")
-    kinds = parser.add_mutually_exclusive_group()
-    kinds.add_argument("--scenes", action="store_true", help="shipped scenes of large displacements")
-    kinds.add_argument("--roll-up", action="store_true", help="tangents of the strip rolled up by 360 degrees")
-    kinds.add_argument("--right-angle", action="store_true", help="iteration matrices of the right-angle cantilever")
-    kinds.add_argument("--chain", action="store_true", help="a link of shells as ERLS, FFR and nodal shells")
-    asked = parser.parse_args()
-    for name, table in (("scenes", scenes), ("roll_up", roll_up), ("right_angle", right_angle), ("chain", chain)):
-        if getattr(asked, name):
-            _write(asked.json, table())
-            return
-    shell_meshes.EXACT.append(exact_stiffness)
+def figures(rows: Callable[[], Iterator[Figure]]) -> Callable[[], dict[str, Any]]:
+    """A table of rows that are made one by one."""
+
+    def table() -> dict[str, Any]:
+        print(str(rows.__doc__).strip().replace("\n    ", "\n"))
+        print(f"{'':<58}{'ours':>14}{'other':>14}{'apart':>10}")
+        found = {}
+        for row in rows():
+            found[row.name] = {"ours": row.ours, "other": row.other, "apart": row.apart}
+            apart = f"{100 * row.apart:9.2f}%" if abs(row.apart) > 1e-4 else f"{row.apart:10.1e}"
+            print(f"{row.name:<58}{row.ours:14.7g}{row.other:14.7g}{apart}", flush=True)
+        return found
+
+    return table
+
+
+def patches() -> Iterator[Figure]:
+    """Constant strains on a distorted mesh of exact shells; energy and forces of a turn as a rigid body."""
+    for name, error in patch_errors().items():
+        yield Figure(f"patch, {name}", error, 0.0, 1.0)
+    system = curved()
+    rest = np.zeros(system.size)
+    turn = np.eye(4)
+    turn[:3, :3] = Rotation.from_rotvec([2.0, -1.5, 0.7]).as_matrix()
+    turn[:3, 3] = 3.0, -2.0, 5.0
+    bent = system.compose(system.start, 0.2 * np.random.default_rng(1).normal(size=system.size))
+    energy = float(system.energies(bent, rest)[1])
+    turned = float(system.energies(system.at(turn @ system.start.poses, system.start), rest)[1])
+    yield Figure("energy after a turn by 150 degrees, of that when strained", turned, 0.0, energy)
+    again = float(system.energies(system.at(turn @ bent.poses, bent), rest)[1])
+    yield Figure("energy when strained, after the turn", again, energy)
+
+
+def links() -> dict[str, Any]:
+    """Shells of links, linear: ours / published."""
     found: dict[str, Any] = {}
     print(f"{'standard set':<34}" + "".join(f"{f'{n} x {n}':>10}" for n in MESHES["standard"]))
     for of, published in PUBLISHED.items():
-        for kind in ("quad4", "tri3", "exact"):
+        for kind in ("quad4", "tri3"):
             row = [of(n, kind) / published for n in MESHES["standard"]]
             found[f"{of.__name__} {kind}"] = row
             print(f"{of.__name__ + ' ' + kind + f' ({published:g})':<34}" + "".join(f"{x:10.4f}" for x in row))
     print(f"\n{'pre-twisted cantilever':<34}" + "".join(f"{f'{a} x {b}':>20}" for a, b in MESHES["twisted"]))
     for thickness, published in TWISTED.items():
-        for kind, drilling in (("quad4", 0.01), ("quad4", 1.0), ("tri3", 0.01), ("exact", 1.0)):
+        for kind, drilling in (("quad4", 0.01), ("quad4", 1.0), ("tri3", 0.01)):
             rows = [twisted(*mesh, thickness, kind, drilling) for mesh in MESHES["twisted"]]
             ratios = [[a / b for a, b in zip(row, published, strict=True)] for row in rows]
             name = f"{kind}, {thickness:g} thick, drilling {drilling:g}"
             found[f"twisted {name}"] = ratios
             print(f"{name:<34}" + "".join(f"{a:12.4f}{b:8.4f}" for a, b in ratios))
+    return found
+
+
+def bracket() -> dict[str, Any]:
+    """First six free frequencies of the bracket [Hz]."""
+    found: dict[str, Any] = {}
     with tempfile.TemporaryDirectory() as folder:
         shells = {f"shells, {turns}": shell_bracket(Path(folder), turns) for turns in (1, 2)}
         judges = {f"hex20, {turns}": solid_bracket(Path(folder), turns) for turns in (2, 3, 4)}
@@ -217,15 +190,74 @@ def main() -> None:
             judges["S8R of CalculiX"] = calculix_bracket(Path(folder), 2)
         else:
             print("\nCalculiX (ccx) is not installed: no S8R")
-    print("\nfirst six free frequencies of the bracket [Hz]")
+        of_gmsh = gmsh_brackets(Path(folder))
+    print("first six free frequencies of the bracket [Hz]")
     for name, values in {**judges, **shells}.items():
-        found[f"bracket {name}"] = values.tolist()
+        found[name] = values.tolist()
         print(f"{name:<22}" + "".join(f"{v:10.2f}" for v in values))
     for name in list(judges)[2:]:
         values = judges[name]
         off = np.abs(shells["shells, 2"] / values - 1).max()
         print(f"finer shells against {name}: {100 * off:.2f} % at most")
-    _write(asked.json, found)
+    print("the shipped bracket, meshed by gmsh, with its holes, 5 mm thick")
+    for name, values in zip(("shells of gmsh", "hex20 about them"), of_gmsh, strict=True):
+        found[name] = values.tolist()
+        print(f"{name:<22}" + "".join(f"{v:10.2f}" for v in values))
+    print(f"apart: {100 * np.abs(of_gmsh[0] / of_gmsh[1] - 1).max():.2f} % at most")
+    return found
+
+
+def arm_stress() -> dict[str, Any]:
+    """Largest von Mises stress in the bracket of the arm, over its thickness, as ERLS, FFR and nodal shells have it."""
+    found: dict[str, Any] = {}
+    times = (0.02, 0.04, 0.06)
+    heads = "".join(f"{f'{1e3 * t:g} ms':>10}" for t in times)
+    print(f"{'bracket arm, stress [MPa]':<28}{heads}{'end off [m]':>14}")
+    first = None
+    for name, step in (("erls", 0.0), ("ffr", 0.0), ("nodal", 2e-3), ("nodal", 5e-4)):
+        changes = [f"simulation.duration={times[-1]}", f"simulation.formulation={name}"]
+        changes += [f"simulation.step={step}"] if step else []
+        run = erls.simulate(erls.load_scene(DATA / "shells/bracket_arm.toml", changes), verdict=False)
+        poses = figure_of(run, 1.0, stress=True).poses(times)
+        largest = [float(np.fmax.reduce(pose.values()[0])) for pose in poses]
+        place = run.position("end", np.array(times))
+        first = place if first is None else first
+        off, words = float(np.abs(place - first).max()), name + (f", {1e3 * step:g} ms" if step else "")
+        found[words] = {"stress_MPa": largest, "off_m": off}
+        print(f"{words:<28}" + "".join(f"{x:10.2f}" for x in largest) + f"{off:14.1e}", flush=True)
+    return found
+
+
+TABLES: dict[str, Callable[[], dict[str, Any]]] = {
+    "patches": figures(patches),
+    "standard": figures(shell_figures.standard),
+    "twisted": figures(shell_figures.twisted),
+    "thin": figures(shell_figures.thin),
+    "large": figures(shell_figures.large),
+    "paths": figures(shell_figures.paths),
+    "flight": figures(shell_figures.flight),
+    "links": links,
+    "bracket": bracket,
+    "roll-up": roll_up,
+    "right-angle": right_angle,
+    "chain": chain,
+    "arm-stress": arm_stress,
+}
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--json", type=Path, help="write the figures to a file, too")
+    for name in TABLES:
+        parser.add_argument(f"--{name}", action="store_true", help="this table")
+    asked = vars(parser.parse_args())
+    chosen = [name for name in TABLES if asked[name.replace("-", "_")]] or list(TABLES)
+    found = {}
+    for name in chosen:
+        found[name] = TABLES[name]()
+        print(flush=True)
+    _write(asked["json"], found)
 
 
 def _write(path: Path | None, found: dict[str, Any]) -> None:

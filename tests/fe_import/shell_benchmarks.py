@@ -15,14 +15,41 @@ from shell_meshes import ShellGrid, dofs, held, plate, shell_grid
 TWISTED = {0.32: (5.424e-3, 1.754e-3), 0.0032: (5.256e-3, 1.294e-3)}  # by thickness: in plane, out of plane
 
 
+Place = tuple[float, float, float]
+ANGLE = np.radians(40)
+
+
+def on_blade(a: float, b: float) -> Place:
+    """The pre-twisted cantilever, over the unit square."""
+    angle, y = np.pi / 2 * a, (b - 0.5) * 1.1
+    return 12 * a, y * np.cos(angle), y * np.sin(angle)
+
+
+def on_roof(a: float, b: float) -> Place:
+    """A quarter of the Scordelis-Lo roof, along and across."""
+    return 25 * np.sin(ANGLE * b), 25 * np.cos(ANGLE * b), 25 * a
+
+
+def on_cylinder(a: float, b: float) -> Place:
+    """An eighth of the pinched cylinder, along and around."""
+    return 300 * np.sin(np.pi / 2 * b), 300 * np.cos(np.pi / 2 * b), 300 * a
+
+
+def on_hemisphere(a: float, b: float) -> Place:
+    """A quarter of the hemisphere, down and around."""
+    down, along = np.radians(18 + 72 * a), np.pi / 2 * b
+    return 10 * np.sin(down) * np.cos(along), 10 * np.sin(down) * np.sin(along), 10 * np.cos(down)
+
+
+def on_annulus(a: float, b: float) -> Place:
+    """The slit annulus, out and around; its lips are a little apart, so that their nodes are their own."""
+    radius, along = 6 + 4 * a, 2 * np.pi * (1 - 1e-5) * b
+    return radius * np.cos(along), radius * np.sin(along), 0.0
+
+
 def twisted_grid(nx: int, ny: int, kind: str) -> ShellGrid:
     """The pre-twisted cantilever."""
-
-    def place(a: float, b: float) -> tuple[float, float, float]:
-        angle, y = np.pi / 2 * a, (b - 0.5) * 1.1
-        return 12 * a, y * np.cos(angle), y * np.sin(angle)
-
-    return shell_grid(nx, ny, place, kind)
+    return shell_grid(nx, ny, on_blade, kind)
 
 
 def twisted(nx: int, ny: int, thickness: float, kind: str, drilling: float = 0.01) -> list[float]:
@@ -42,8 +69,7 @@ def twisted(nx: int, ny: int, thickness: float, kind: str, drilling: float = 0.0
 
 def roof(n: int, kind: str) -> float:
     """Scordelis-Lo roof, a quarter: deflection of the middle of its free edge."""
-    angle = np.radians(40)
-    grid = shell_grid(n, n, lambda a, b: (25 * np.sin(angle * b), 25 * np.cos(angle * b), 25 * a), kind)
+    grid = shell_grid(n, n, on_roof, kind)
     _, stiffness = grid.matrices(plate(4.32e8, 0.0, 0.25))
     corners = grid.nodes[grid.elements]
     ends = (corners[:, 1] - corners[:, 0], corners[:, -1] - corners[:, 0])
@@ -58,7 +84,7 @@ def roof(n: int, kind: str) -> float:
 
 def cylinder(n: int, kind: str) -> float:
     """Pinched cylinder with diaphragms, an eighth: deflection under a quarter of the load."""
-    grid = shell_grid(n, n, lambda a, b: (300 * np.sin(np.pi / 2 * b), 300 * np.cos(np.pi / 2 * b), 300 * a), kind)
+    grid = shell_grid(n, n, on_cylinder, kind)
     _, stiffness = grid.matrices(plate(3e6, 0.3, 3.0))
     force = np.zeros(6 * len(grid.nodes))
     force[6 * grid.at[-1, 0] + 1] = -0.25
@@ -69,12 +95,7 @@ def cylinder(n: int, kind: str) -> float:
 
 def hemisphere(n: int, kind: str) -> float:
     """Hemisphere with a hole of 18 degrees, a quarter, pulled and pushed at its equator."""
-
-    def place(a: float, b: float) -> tuple[float, float, float]:
-        down, along = np.radians(18 + 72 * a), np.pi / 2 * b
-        return 10 * np.sin(down) * np.cos(along), 10 * np.sin(down) * np.sin(along), 10 * np.cos(down)
-
-    grid = shell_grid(n, n, place, kind)
+    grid = shell_grid(n, n, on_hemisphere, kind)
     _, stiffness = grid.matrices(plate(6.825e7, 0.3, 0.04))
     force = np.zeros(6 * len(grid.nodes))
     force[6 * grid.at[-1, 0]], force[6 * grid.at[-1, -1] + 1] = 1.0, -1.0

@@ -9,9 +9,10 @@ import scipy.sparse.linalg as sla
 from calculix import calculix_frequencies
 from link_files import write_toml
 from numpy.typing import NDArray
-from shell_meshes import ShellGrid, shell_grid, write_deck
+from shell_meshes import Array, IntArray, ShellGrid, shell_grid, write_deck
 
 from fe_import.description.link import load_link
+from fe_import.mesh.read import Wanted, read_mesh
 from fe_import.models.model import build_model
 
 ALU = {"youngs_modulus": 70e9, "poissons_ratio": 0.33, "density": 2700.0}
@@ -72,34 +73,54 @@ def calculix_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
 
 def solid_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
     """The same of hexahedra of 20 nodes about the same middle surface, mitred at the fold."""
-    grid, half = bracket(turns), THICKNESS / 2
-    x, z = grid.nodes[:, 0], grid.nodes[:, 2]
-    fold = (np.abs(x) < 1e-12) & (np.abs(z) < 1e-12)
-    away = np.where((z > 1e-12)[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
+    grid = bracket(turns)
+    return _thickened(folder, grid.nodes, [grid.elements])
+
+
+def gmsh_brackets(folder: Path) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """The first six of the shipped bracket, meshed by gmsh and with its holes, in the same thickness: its shells, and
+    hexahedra of 20 nodes, with a few wedges of 15, about them.
+    """
+    path = Path(__file__).parents[2] / "data/shells/meshes/bracket.msh"
+    mesh = read_mesh(path, (), Wanted(solids=False, shells=True))
+    corner = mesh.nodes[int(np.argmin(np.linalg.norm(mesh.nodes, axis=1)))]
+    shell = {"mesh": str(path), "material": "m", "thickness": THICKNESS, "nodes": {"c": corner.tolist()}}
+    described = write_toml(folder / "gmsh.toml", {
+        "materials": {"m": ALU}, "shell": shell, "interfaces": [{"name": "hub", "node": "c"}],
+    })  # fmt: skip
+    return _frequencies(described), _thickened(folder, mesh.nodes, [cells.elements for cells in mesh.shells])
+
+
+def _thickened(folder: Path, surface: Array, cells: list[IntArray]) -> NDArray[np.float64]:
+    """Of a solid of one element across, over quadrangles and triangles of a bracket."""
+    half, count = THICKNESS / 2, len(surface)
+    x, z = surface[:, 0], surface[:, 2]
+    fold = (np.abs(x) < 1e-9) & (np.abs(z) < 1e-9)
+    away = np.where((z > 1e-9)[:, None], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0])
     away[fold] = [1.0, 0.0, 1.0]
-    nodes = np.vstack([grid.nodes - half * away, grid.nodes + half * away])
-    count = len(grid.nodes)
-    corners = np.hstack([grid.elements, grid.elements + count])
-    if np.linalg.det(nodes[corners[0, [1, 3, 4]]] - nodes[corners[0, 0]]) < 0:
-        corners = corners[:, [4, 5, 6, 7, 0, 1, 2, 3]]
-    every, middles, rows = nodes.tolist(), dict[tuple[int, int], int](), []
-    edges = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
-    for row in corners.tolist():
-        own = []
+    corners = np.vstack([surface - half * away, surface + half * away])
+    every, middles, rows = corners.tolist(), dict[tuple[int, int], int](), list[list[int]]()
+    for row in (row for own in cells for row in own.tolist()):
+        upper = [n + count for n in row]
+        frame = corners[[row[1], row[-1], upper[0]]] - corners[row[0]]
+        prism, sides = ([*row, *upper] if np.linalg.det(frame) > 0 else [*upper, *row]), len(row)
+        around = [(k, (k + 1) % sides) for k in range(sides)]
+        edges = [*around, *((a + sides, b + sides) for a, b in around), *((k, k + sides) for k in range(sides))]
         for a, b in edges:
-            pair = (min(row[a], row[b]), max(row[a], row[b]))
+            pair = (min(prism[a], prism[b]), max(prism[a], prism[b]))
             if pair not in middles:
                 middles[pair] = len(every)
-                every.append(((nodes[pair[0]] + nodes[pair[1]]) / 2).tolist())
-            own.append(middles[pair])
-        rows.append([*row, *own])
-    root = [*grid.at[0], *(grid.at[0] + count)]
+                every.append(((corners[pair[0]] + corners[pair[1]]) / 2).tolist())
+        rows.append([*prism, *(middles[min(prism[a], prism[b]), max(prism[a], prism[b])] for a, b in edges)])
     lines = ["*NODE", *(f"{k + 1}, {p[0]:.12g}, {p[1]:.12g}, {p[2]:.12g}" for k, p in enumerate(every))]
-    lines.append("*ELEMENT, TYPE=C3D20, ELSET=E")
-    for k, row in enumerate(rows):
-        given = [str(n + 1) for n in [k, *row]]
-        lines += [", ".join(given[:11]) + ",", ", ".join(given[11:])]
-    lines += ["*NSET, NSET=ROOT", *(f"{n + 1}," for n in root)]
+    for size in (20, 15):
+        own = [(k, row) for k, row in enumerate(rows) if len(row) == size]
+        lines += [f"*ELEMENT, TYPE=C3D{size}, ELSET=E"] if own else []
+        for k, row in own:
+            given = [str(n + 1) for n in [k, *row]]
+            lines += [", ".join(given[:11]) + ",", ", ".join(given[11:])]
+    end = np.flatnonzero(x > x.max() - 1e-9)
+    lines += ["*NSET, NSET=ROOT", *(f"{n + 1}," for n in [*end, *(end + count)])]
     (folder / "solid.inp").write_text("\n".join(lines) + "\n")
     return _frequencies(write_toml(folder / "solid.toml", {
         "materials": {"m": ALU}, "solid": {"mesh": "solid.inp", "material": "m"},

@@ -29,10 +29,7 @@ class ShellGrid:
     at: IntArray
 
     def matrices(self, make: Laminate, drilling: float = 0.01) -> tuple[sp.csc_array, sp.csc_array]:
-        """Mass and stiffness, row 6 * node + component; of shells of another package the stiffness twice."""
-        if self.kind == "exact":
-            stiffness = EXACT[0](self, make, 1.0)
-            return stiffness, stiffness
+        """Mass and stiffness, row 6 * node + component."""
         count = len(self.elements)
         whole = np.tile(make.stiffness(), (count, 1, 1)), np.tile(make.moments(), (count, 1))
         block = ShellBlock(SHELL_ELEMENTS[self.kind], self.elements, *whole)
@@ -42,10 +39,6 @@ class ShellGrid:
         size = 6 * len(self.nodes)
         both = (sp.coo_array((m.ravel(), places), shape=(size, size)).tocsc() for m in (mass, stiffness))
         return next(both), next(both)
-
-
-EXACT: list[Callable[[ShellGrid, Laminate, float], sp.csc_array]] = []
-"""What makes the stiffness of a grid of the kind ``exact``."""
 
 
 def shell_grid(nx: int, ny: int, place: Callable[[float, float], tuple[float, float, float]], kind: str) -> ShellGrid:
@@ -79,12 +72,14 @@ def held(stiffness: sp.csc_array, force: Array, fixed: IntArray) -> Array:
     return moved
 
 
-def write_deck(path: Path, grid: ShellGrid, ends: bool = True) -> Path:
-    """An Abaqus deck with sets PLATE, ROOT (the first nodes along x) and TIP."""
+def write_deck(path: Path, grid: ShellGrid, ends: bool = True, **sets: IntArray) -> Path:
+    """An Abaqus deck with sets PLATE, ROOT (the first nodes along x) and TIP, or others in place of these two."""
     lines = ["*NODE", *(f"{k + 1}, {x:.12g}, {y:.12g}, {z:.12g}" for k, (x, y, z) in enumerate(grid.nodes.tolist()))]
     lines.append(f"*ELEMENT, TYPE={'S4' if grid.kind == 'quad4' else 'S3'}, ELSET=PLATE")
     lines += [", ".join(map(str, [k + 1, *(np.array(row) + 1)])) for k, row in enumerate(grid.elements.tolist())]
-    for name, row in (("ROOT", grid.at[0]), ("TIP", grid.at[-1])) if ends else ():
+    if ends and not sets:
+        sets = {"ROOT": grid.at[0], "TIP": grid.at[-1]}
+    for name, row in sets.items():
         lines += [f"*NSET, NSET={name}", *(f"{node + 1}," for node in row)]
     path.write_text("\n".join(lines) + "\n", encoding="utf-8")
     return path
