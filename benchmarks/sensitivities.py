@@ -67,7 +67,7 @@ def costs(run: Any, run_s: float, count: int, method: Any) -> str:
     terms = [one.terms for one in equations.derivatives if one is not None]
     each = sum(sum(term.apart != 0 for term in some) for some in terms)
     each += any(term.apart == 0 for some in terms for term in some)
-    passes = "a program" if equations.evaluation.kernels else f"{4 * n}"
+    passes = "a program" if equations.evaluation.taped else f"{4 * n}"
     parts = "".join(f"{part / run_s:9.2f}" for part in (tangents_s, made_s, forces_s, rest_s))
     own = run.solution.work.rhs_calls / knots
     return (

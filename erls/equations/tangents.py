@@ -17,7 +17,7 @@ from erls.equations.compiled_system import CompiledSystem
 from erls.equations.linearization import difference_steps
 from erls.equations.series import mass_series, residual_series
 from erls.equations.side_by_side import eightfold_forces, eightfold_kernels
-from erls.equations.taped import taped_tangents
+from erls.equations.taped import taped_tangents, worth_taping
 from erls.maths.so3 import Array
 
 _ROUGHER = 5.0
@@ -50,16 +50,22 @@ class Evaluation:
     steps : (n,) array
         Of differences, `steps_of`.
     kernels : module or None
-        Of eightfold numbers; None where these and tapes are not worth it.
+        Of eightfold numbers; None where a system has none, or where they are not worth it.
+    taped : bool
+        Whether tangents come from a tape, if it can be made.
     """
 
     steps: Array
     kernels: Any = None
+    taped: bool = False
 
     @classmethod
     def of(cls, system: CompiledSystem, steps: Array, knots: int) -> Evaluation:
         """For a run with so many knots."""
-        return cls(steps, eightfold_kernels(system, 4 * system.size * knots))
+        asked = 4 * system.size * knots
+        kernels = eightfold_kernels(system, asked)
+        loops = hasattr(system, "called") and worth_taping(asked)
+        return cls(steps, kernels, kernels is not None or loops)
 
     def forces(self, system: CompiledSystem, knots: Knots) -> Array:
         """(k, n) forces out of balance, of equations of the same kind."""
@@ -70,7 +76,7 @@ class Evaluation:
     def tangents(self, system: CompiledSystem, knots: Knots) -> Tangents:
         """At all knots."""
         t, y, v, a = knots
-        found = taped_tangents(system, *knots) if self.kernels is not None else None
+        found = taped_tangents(system, *knots) if self.taped else None
         if found is not None:
             stiffness, damping, mass = (np.ascontiguousarray(x) for x in np.split(found, 3, axis=2))
             return Tangents(mass, damping, stiffness)

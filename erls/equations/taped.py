@@ -18,10 +18,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from erls.equations import side_by_side
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.serial.curve_series import curves_at
 from erls.equations.serial.time_curves import curve
-from erls.maths.jit import plain
+from erls.maths.jit import ENABLED, plain
 from erls.maths.linearized import Program, jacobian
 from erls.maths.so3 import Array
 from erls.maths.tracing import Tape, Traced
@@ -30,6 +31,7 @@ from fe_import.model import IntArray
 _KINDS = 16  # of systems that are remembered
 _WAYS = 8  # of forces of a system
 _LONGEST = 500_000  # numbers of a tape, ten seconds
+_LOOPS = 10  # times as many evaluations of loops as of chains: conditions couple all coordinates, a tape takes as long
 
 
 class _Noting:
@@ -90,6 +92,11 @@ class _Ways:
     closed: bool = False
 
 
+def worth_taping(evaluations: int) -> bool:
+    """Whether tapes of loops are worth their making, against so many evaluations of forces."""
+    return ENABLED and evaluations >= _LOOPS * side_by_side.WORTH
+
+
 def _noted(system: CompiledSystem, t: float, y: Array, v: Array, a: Array) -> _Way | None:
     """The way of forces at a state; None where formulas do more with a number than a tape can note, or too much."""
     noting = _Noting(system, t)
@@ -102,7 +109,7 @@ def _noted(system: CompiledSystem, t: float, y: Array, v: Array, a: Array) -> _W
     try:
         residual = plain(system.residual, called=called)
         residual(reals, system.integers, system.scratch.astype(object), now[0], *state, out)
-    except (TypeError, ArithmeticError):
+    except (TypeError, AttributeError, ArithmeticError):
         return None
     finally:
         _now.pop()
@@ -136,7 +143,7 @@ _known: OrderedDict[tuple[Any, bytes, bytes], _Ways] = OrderedDict()
 def taped_tangents(system: CompiledSystem, t: Array, y: Array, v: Array, a: Array) -> Array | None:
     """(k, n, 3 n) ∂R/∂(y, v, a) at k states; None where forces cannot be noted, or go too many ways.
 
-    Of systems that call no other one by its address.
+    Of systems that call others by their addresses alone where these are told (`CompiledLoops.called`).
     """
     key = system.residual, system.integers.tobytes(), (system.reals == 0).tobytes()
     ways = _known.setdefault(key, _Ways())

@@ -49,7 +49,9 @@ def _function(which: int, x: float) -> float:
         return math.atan(x)
     if which == 11:
         return 1.0 if x > 0.0 else -1.0 if x < 0.0 else 0.0
-    return abs(x)
+    if which == 12:
+        return abs(x)
+    return math.floor(x)
 
 
 @part

@@ -40,6 +40,7 @@ FUNCTIONS = (
     Function("arctan", np.arctan, lambda x, f: 1.0 / (1.0 + x * x)),
     Function("sign", np.sign, lambda x, f: 0.0),
     Function("fabs", np.fabs, lambda x, f: x.sign()),
+    Function("floor", np.floor, lambda x, f: 0.0),
 )
 _NUMBER = {function.name: PRODUCT + 1 + k for k, function in enumerate(FUNCTIONS)}
 COMPARISONS = (operator.lt, operator.le, operator.gt, operator.ge, operator.eq, operator.ne)
@@ -150,6 +151,17 @@ class Traced:
 
     def __abs__(self) -> Any:
         return self._function("fabs")
+
+    def arctan2(self, other: Any) -> Any:
+        """The angle of a point, by that of half of it on the side where this does not cancel; NumPy calls it."""
+        length = (self * self + other * other)._function("sqrt")
+        if other >= 0.0:
+            return 2.0 * (self / (length + other))._function("arctan")
+        turned = np.pi if self._compare(COMPARISONS.index(operator.ge), 0.0) else -np.pi
+        return turned - 2.0 * (self / (length - other))._function("arctan")
+
+    def __floor__(self) -> Any:
+        return self._function("floor")
 
     def __bool__(self) -> bool:
         return self._compare(COMPARISONS.index(operator.ne), 0.0)

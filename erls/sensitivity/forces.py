@@ -91,18 +91,32 @@ def force_derivative(
     """
     if not difference.acts:
         return None
-    terms = _along_constants(base, difference)
-    if terms is None:
+    line = _line(base, difference)
+    if line is None:
         terms = [Term(one.weight, one.apart, one.formulation.compiled, one.turn) for one in difference.variants]
+    else:
+        terms = _along(line, base, STEP * difference.parameter.size)
     here = Term(0.0, 0.0, base)
     found = [term.forces(sample, evaluation) for term in terms]
     rounding = _ROUNDING * max(map(_largest, found)) / min(abs(term.apart) for term in terms if term.apart)
+    inner, whole, curved = _inner(terms, found, rounding)
+    if line is not None and whole and (inner is None or rounding > _LINEAR * whole):
+        off = max(curved, rounding)
+        share = (rounding * whole / off**2 / 4) ** 0.2  # the least of (off/whole)² s⁴ + (rounding/whole) / s
+        return ForceDerivative(tuple(_along(line, base, share * STEP * difference.parameter.size)))
     linear = _linear([here, *terms], [here.forces(sample, evaluation), *found], rounding)
-    return ForceDerivative(linear or _inner(terms, found, rounding))
+    return ForceDerivative(linear or inner or tuple(terms))
 
 
-def _along_constants(base: CompiledSystem, difference: Difference) -> list[Term] | None:
-    """Terms of fourth order with constants c + Δp dc/dp: forces are simpler functions of constants than of parameters.
+class _Line(NamedTuple):
+    """Equations of some kind, whose constants are c + Δp dc/dp."""
+
+    system: CompiledSystem
+    slope: Array
+
+
+def _line(base: CompiledSystem, difference: Difference) -> _Line | None:
+    """Forces are simpler functions of constants than of parameters.
 
     None where equations of another kind, or in other coordinates, stand at other values. One that comes into play with
     the parameter, a damper say, may be of a kind of its own, whose constants are those of the run without it.
@@ -119,9 +133,13 @@ def _along_constants(base: CompiledSystem, difference: Difference) -> list[Term]
         same = np.all([x.reals == base.reals for x in every], axis=0)  # infinite ones, too
         weights = [variant.weight for variant in difference.variants]
         slope = np.sum([w * np.where(same, 0.0, x.reals) for w, x in zip(weights, every, strict=True)], axis=0)
-    step = STEP * difference.parameter.size
+    return _Line(found[0], slope)
+
+
+def _along(line: _Line, base: CompiledSystem, step: float) -> list[Term]:
+    """Terms of fourth order."""
     moved = [(weight / step, at * step) for at, weight in STENCILS[0]]
-    return [Term(weight, apart, replace(found[0], reals=base.reals + apart * slope)) for weight, apart in moved]
+    return [Term(weight, apart, replace(line.system, reals=base.reals + apart * line.slope)) for weight, apart in moved]
 
 
 def _linear_slope(here: Array, first: Variant, second: Variant) -> Array | None:
@@ -151,16 +169,22 @@ def _linear(terms: list[Term], found: list[Array], rounding: float) -> tuple[Ter
     return far._replace(weight=1 / far.apart), terms[0]._replace(weight=-1 / far.apart)
 
 
-def _inner(terms: list[Term], found: list[Array], rounding: float) -> tuple[Term, ...]:
-    """The two terms on either side of the run, if they are enough and something shows."""
+def _inner(
+    terms: list[Term], found: list[Array], rounding: float
+) -> tuple[tuple[Term, ...] | None, float, float]:
+    """The two terms on either side of the run, if they are enough and something shows; how large the derivative is, and
+    by how much that of two terms is off, which the third derivative makes.
+    """
     if terms[0].apart >= 0 or terms[-1].apart <= 0:
-        return tuple(terms)
+        return None, 0.0, 0.0
     inner = tuple(term._replace(weight=0.75 * term.weight) for term in terms[1:3])
     weights = np.array([term.weight for term in terms])
     whole = np.tensordot(weights, np.array(found), 1)
     less = 0.75 * np.tensordot(weights[1:3], np.array(found[1:3]), 1)
-    shows = _largest(whole) > _SEEN * rounding
-    return inner if shows and _largest(whole - less) <= _LINEAR * _largest(whole) + rounding else tuple(terms)
+    size, off = _largest(whole), _largest(whole - less)
+    if size <= _SEEN * rounding:
+        return None, 0.0, off
+    return (inner if off <= _LINEAR * size + rounding else None), size, off
 
 
 def _largest(x: Array) -> float:

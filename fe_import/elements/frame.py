@@ -112,10 +112,16 @@ _PLANES = (
 )
 
 
+def _scalar(element: FrameElement) -> np.dtype[np.generic]:
+    """Of its numbers, which may be complex: derivatives of matrices by complex steps."""
+    own = element.length, element.youngs_modulus, element.shear_modulus, element.density
+    return np.result_type(np.float64, *own, *vars(element.section).values())
+
+
 def element_stiffness(element: FrameElement, shear: bool) -> dict[str, Array]:
     """(12, 12) stiffness in local axes, split into axial, torsion and the two bendings."""
     s, length, e = element.section, element.length, element.youngs_modulus
-    parts = {name: np.zeros((12, 12)) for name in STIFFNESS_PARTS}
+    parts = {name: np.zeros((12, 12), _scalar(element)) for name in STIFFNESS_PARTS}
     pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
     parts["axial"][np.ix_([0, 6], [0, 6])] = e * s.area / length * pair
     parts["torsion"][np.ix_([3, 9], [3, 9])] = element.shear_modulus * s.torsion_constant / length * pair
@@ -132,7 +138,7 @@ def element_stiffness(element: FrameElement, shear: bool) -> dict[str, Array]:
                 [a, (2 - phi) * b, -a, (4 + phi) * b],
             ]
         )
-        block *= e * inertia / ((1 + phi) * length**3)
+        block = block * (e * inertia / ((1 + phi) * length**3))
         parts[name][np.ix_(dofs, dofs)] = block * np.outer(signs, signs)
     return parts
 
@@ -160,9 +166,9 @@ def element_mass(element: FrameElement, shear: bool, mass: str, rotary_inertia: 
     """
     s, length, rho = element.section, element.length, element.density
     polar = s.inertia_y + s.inertia_z
-    result = np.zeros((12, 12))
+    result = np.zeros((12, 12), _scalar(element))
     if mass == "lumped":
-        node = np.zeros(6)
+        node = np.zeros(6, result.dtype)
         node[:3] = s.area
         if rotary_inertia:
             node[3:] = polar, s.inertia_y, s.inertia_z
@@ -177,7 +183,7 @@ def element_mass(element: FrameElement, shear: bool, mass: str, rotary_inertia: 
         deflection, slope = bending_shapes(_POINTS, length, phi)
         block = s.area * np.einsum("p,pi,pj->ij", _WEIGHTS, deflection, deflection)
         if rotary_inertia:
-            block += inertia * np.einsum("p,pi,pj->ij", _WEIGHTS, slope, slope)
+            block = block + inertia * np.einsum("p,pi,pj->ij", _WEIGHTS, slope, slope)
         result[np.ix_(dofs, dofs)] += rho * length * block * np.outer(signs, signs)
     return result
 

@@ -117,7 +117,7 @@ class _Complex:
                 times = np.clip(s.t[at : at + nodes], leg.first, leg.last).tolist()
                 knots = real[at : at + nodes]
                 if radius is None:
-                    found = self.balanced(times, knots, *_collocation(h, state))
+                    found = self.balanced(times, knots, *collocation(h, state))
                 else:
                     found, algorithmic = self._alpha(times, knots, h, radius, state, algorithmic)
                 result[at : at + nodes] = found
@@ -139,7 +139,7 @@ class _Complex:
         return found, new + share * found[0, 2]
 
 
-def _collocation(h: float, state: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
+def collocation(h: float, state: np.ndarray) -> tuple[Any, np.ndarray, np.ndarray]:
     """What nodes have from the start of a step, and weights of their accelerations."""
     rates, places = tableau(NODES)
     y, v, a = state

@@ -12,11 +12,11 @@ from typing import Any
 import complex_runs
 import numpy as np
 import pytest
+from held_runs import tightened
 
 import erls
 from erls.equations import side_by_side
 from erls.errors import SceneError
-from erls.integrate.choice import integrator, options_of
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.forward import differentiated
 from erls.sensitivity.parameters import parameters_of
@@ -95,18 +95,6 @@ def test_parameters_of_mechanisms(method: str, keys: list[str], monkeypatch: pyt
             assert np.abs(found[:, of, :, k] - expected[:, of]).max() <= limit, (parameter.key, of)
 
 
-def _tight(run: ChainRun, formulation: Any) -> ChainRun:
-    """The run of equations with fixed steps whose iterations end at rounding."""
-    settings = run.scene.record.simulation
-    options = replace(options_of(settings), newton_tolerance=0.0)
-    start = formulation.initial_state()
-    solution = integrator(formulation.mechanism, settings)(
-        formulation, (0.0, settings.duration), *start, options, None
-    )
-    assert solution.failure is None
-    return replace(run, formulation=formulation, solution=solution)
-
-
 @pytest.mark.parametrize("key", ["links.forearm.model.sections.bar.width", "joints.0.initial.position_deg"])
 def test_differences_of_tightened_runs(key: str) -> None:
     """From a static start, links of square section, of which one side grows: a pair of equal frequencies parts.
@@ -116,14 +104,14 @@ def test_differences_of_tightened_runs(key: str) -> None:
     overrides = ["simulation.step=2e-3", "simulation.duration=0.04", "initial.deformation=static"]
     overrides += ['joints.0.drive={type="free"}', "joints.0.initial.position_deg=-30"]
     first = _run(ROBOT, overrides)
-    run = _tight(first, first.formulation)
+    run = tightened(first, first.formulation)
     outputs: dict[str, Callable[[ChainRun], Any]] = {
         "end": lambda run: run.position("end2", [0.02, 0.04]),
         "moment": lambda run: run.reaction("shoulder", 0.04)[1],
     }
     found = erls.sensitivities(run, outputs, [key])
     (difference,) = differences(run, parameters_of(run.scene, [key]))
-    tight = {variant.weight: _tight(run, variant.formulation) for variant in difference.variants}
+    tight = {variant.weight: tightened(run, variant.formulation) for variant in difference.variants}
     for name, output in outputs.items():
         expected = difference.of(lambda variant, output=output: np.asarray(output(tight[variant.weight])))
         assert np.abs(found.derivatives[name][key] - expected).max() <= 2e-6 * np.abs(expected).max(), name
@@ -175,7 +163,7 @@ def test_stiffness_and_mass_scale_out(path: Path, overrides: list[str], links: d
     keys = [f"links.{name}.model.materials.{material}.{of}" for name, material in links.items() for of in SCALES]
     end = float(overrides[-1].partition("=")[2])
     run, stepped = _run(path, overrides), "integrator" not in "".join(overrides)
-    run = _tight(run, run.formulation) if stepped else run
+    run = tightened(run, run.formulation) if stepped else run
     found = erls.sensitivities(run, {"place": lambda run: run.position(point, [end / 2, end]), "mass": _mass}, keys)
     masses = [found.parameters[key] * found.derivatives["mass"][key] for key in keys]
     np.testing.assert_allclose(masses[::2], 0.0, atol=1e-9 * _mass(run))

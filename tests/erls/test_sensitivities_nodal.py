@@ -5,17 +5,16 @@ closed form.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import complex_nodal_runs
 import numpy as np
 import pytest
+from held_runs import tightened
 from test_sensitivities import DRIVEN, OF_MECHANISM
 
 import erls
-from erls.integrate.choice import integrator, options_of
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.nodal_forward import changes_of
 from erls.sensitivity.parameters import parameters_of
@@ -50,17 +49,6 @@ def test_parameters_of_mechanisms(method: str, keys: list[str]) -> None:
             own = found[:, k, of * n : (of + 1) * n]
             limit = EXACT * scale + NOTHING / parameter.size
             assert np.abs(own - expected[:, of]).max() <= limit, (parameter.key, of)
-
-
-def _tight(run: ChainRun, formulation: Any) -> ChainRun:
-    """The run of equations with fixed steps whose iterations end at rounding."""
-    settings = run.scene.record.simulation
-    options = replace(options_of(settings), newton_tolerance=1e-16)
-    solution = integrator(formulation.mechanism, settings)(
-        formulation, (0.0, settings.duration), *formulation.initial_state(), options, None
-    )
-    assert solution.failure is None
-    return replace(run, formulation=formulation, solution=solution)
 
 
 FLOOR = {"end": 1e-6, "turn": 1e-6, "middle": 1e-6, "moment": 1e-5, "force": 1e-5}
@@ -133,10 +121,11 @@ def test_differences_of_tightened_runs(
 ) -> None:
     """From static starts, by dimensions of links and of joints; central differences of fourth order have floors."""
     first = _run(path, overrides)
-    run = _tight(first, first.formulation)
+    run = tightened(first, first.formulation, 1e-16)
     found = erls.sensitivities(run, outputs, keys)
     for difference in differences(run, parameters_of(run.scene, keys)):
-        key, tight = difference.parameter.key, [_tight(run, variant.formulation) for variant in difference.variants]
+        key, others = difference.parameter.key, [variant.formulation for variant in difference.variants]
+        tight = [tightened(run, other, 1e-16) for other in others]
         weights = [variant.weight for variant in difference.variants]
         for name, output in outputs.items():
             expected = sum(w * np.asarray(output(other)) for w, other in zip(weights, tight, strict=True))

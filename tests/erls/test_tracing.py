@@ -77,3 +77,26 @@ def test_powers_and_truth() -> None:
     assert not zero
     assert y
     assert len(tape.guards) == before + 2
+
+
+@compiled_only
+@pytest.mark.parametrize("turn", [0.3, 1.8, 3.0, -0.2, -2.0, -3.0])
+def test_angles(turn: float) -> None:
+    """Of points on every side, with turns that are rounded down, and slopes of both: d φ = (c ds - s dc) / r²."""
+    from erls.maths.programs import run
+
+    tape = Tape()
+    s, c = tape.leaves([2 * np.sin(turn), 2 * np.cos(turn)])
+    angle = np.arctan2(s, c)
+    turns = np.floor(angle)
+    assert angle.value == pytest.approx(turn, rel=1e-15)
+    assert turns.value == np.floor(turn)
+    program, places = jacobian(tape, [s.place, c.place], [angle.place, turns.place], [])
+    values = np.array([[s.value, c.value], [1.1 * s.value, 0.9 * c.value]])
+    leaves = {place: k for k, place in enumerate(program.leaves)}
+    found, held = run(program, np.array(tape.values)[program.leaves], np.array([leaves[0], leaves[1]]), values)
+    assert held.all()
+    expected = np.stack([values[:, 1], -values[:, 0]], axis=1) / (values**2).sum(axis=1)[:, None]
+    whole = np.zeros((2, 2, 2))
+    whole[:, places[:, 0], places[:, 1]] = found
+    np.testing.assert_allclose(whole, np.stack([expected, 0 * expected], axis=1), rtol=1e-14, atol=1e-15)

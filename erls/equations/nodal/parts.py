@@ -28,7 +28,7 @@ from fe_import.models.frame import FrameMesh
 from fe_import.models.frame_parts import FrameParts, frame_parts
 
 STIFF_SHEAR = 1e4  # shear then counts 1e-7 of the bending of a slender member
-_SAME = 1e-9
+SAME = 1e-9
 
 
 @dataclass(frozen=True)
@@ -46,6 +46,8 @@ class LinkParts:
         Where the nodes of the modal model lie: beam, and share of its length. Empty for other links.
     shells : list of Shell
         Corners in the mesh frame.
+    corners : (q, 4) int array
+        Which nodes of the mesh these are, as many nodes of the modal model first as there are.
     carriers : (n,) int array
         Of a link of shells the node that each node of the modal model goes with.
     """
@@ -56,6 +58,7 @@ class LinkParts:
     elements: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     fractions: Array = field(default_factory=lambda: np.zeros(0))
     shells: list[Shell] = field(default_factory=list)
+    corners: IntArray = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
     carriers: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
@@ -101,7 +104,8 @@ def link_parts(link: Link, elements: int | None, times: int, rules: BeamRules = 
         raise refused(what, where, "solid, or reduced elsewhere", remedy)
     frame = link.description.frame
     parts = frame_parts(link.description, frame, where, elements, times)
-    own = frame_parts(link.description, frame, where).mesh
+    same = elements is None and times == 1
+    own = parts.mesh if same else frame_parts(link.description, frame, where).mesh
     places = _places(own, parts.mesh)
     return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places, rules), *places)
 
@@ -117,7 +121,7 @@ def _places(own: FrameMesh, mesh: FrameMesh) -> tuple[IntArray, Array]:
     for before, after in zip(own.members, mesh.members, strict=True):
         chain = [own.elements[before[0]].nodes[0], *(own.elements[e].nodes[1] for e in before)]
         along = np.linspace(0.0, len(after), len(chain))
-        within = np.clip(np.floor(along + _SAME), 0, len(after) - 1).astype(np.int64)
+        within = np.clip(np.floor(along + SAME), 0, len(after) - 1).astype(np.int64)
         elements[chain], fractions[chain] = after[0] + within, along - within
     return elements, fractions
 
@@ -135,7 +139,7 @@ def node_at(parts: LinkParts, number: int, where: str) -> int:
     if not parts.beams:
         return 0
     end = round(float(parts.fractions[number]))
-    if abs(parts.fractions[number] - end) > _SAME:
+    if abs(parts.fractions[number] - end) > SAME:
         raise SceneError(
             Cause.BAD_FIELD,
             "a payload, a load or a joint sits between the nodes",

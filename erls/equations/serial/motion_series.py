@@ -79,10 +79,10 @@ def motion_series(formulation: Formulation, t: Array, y: Array, v: Array, a: Arr
     """
     if isinstance(formulation, _MovesAtAll):
         return formulation.motion_series(t, y, v, a)
-    return _differences(formulation, t, y, v, a)
+    return differenced(formulation, t, y, v, a)
 
 
-def _differences(formulation: Formulation, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
+def differenced(formulation: Formulation, t: Array, y: Array, v: Array, a: Array) -> MotionSeries:
     """By differences of states along the parabola; prescribed joints follow the time."""
     found = [state_series(formulation, t + h, y + h * v + h * h / 2 * a, v + h * a) for h in NUDGE * np.arange(-2, 3)]
     states, links = found[2], range(len(found[2].poses))
@@ -90,24 +90,26 @@ def _differences(formulation: Formulation, t: Array, y: Array, v: Array, a: Arra
     def moving(values: list[Array]) -> Moving:
         return Moving(values[2], *(sum(w * x for w, x in zip(row, values, strict=True)) for row in (_FIRST, _SECOND)))
 
-    frames = [moving([s.poses[k] for s in found]) for k in links]
     modal = [moving([s.modal[k] for s in found]) for k in links]
-    spins = [_spin(f) for f in frames]
-    linear = [_own(f.place, f.rate[:, :3, 3]) for f in frames]
-    speeding = [
-        _own(f.place, f.acceleration[:, :3, 3]) - cross_all(spin, speed)
-        for f, (spin, _), speed in zip(frames, spins, linear, strict=True)
-    ]
+    twists = [twist_of(moving([s.poses[k] for s in found])) for k in links]
     return MotionSeries(
         states,
-        [np.hstack([speed, spin]) for speed, (spin, _) in zip(linear, spins, strict=True)],
-        [np.hstack([rate, spin_rate]) for rate, (_, spin_rate) in zip(speeding, spins, strict=True)],
+        [twist for twist, _ in twists],
+        [rate for _, rate in twists],
         [m.rate for m in modal],
         [m.acceleration for m in modal],
         moving([s.angles for s in found]).acceleration,
         nodes=None if states.nodes is None else [moving([s.nodes[k] for s in found if s.nodes]) for k in links],
         turns=None if states.turns is None else [moving([s.turns[k] for s in found if s.turns]) for k in links],
     )
+
+
+def twist_of(frame: Moving) -> tuple[Array, Array]:
+    """(k, 6) twist [linear; angular] of poses (k, 4, 4) in their own axes, and the derivative of its components."""
+    spin, spin_rate = _spin(frame)
+    speed = _own(frame.place, frame.rate[:, :3, 3])
+    speeding = _own(frame.place, frame.acceleration[:, :3, 3]) - cross_all(spin, speed)
+    return np.hstack([speed, spin]), np.hstack([speeding, spin_rate])
 
 
 def _own(poses: Array, vectors: Array) -> Array:
