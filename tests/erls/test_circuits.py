@@ -38,8 +38,9 @@ def exact(t: float) -> np.ndarray:
     return np.asarray((la.expm(whole * t) @ [0.0, 0.0, 1.0])[:2])
 
 
-@pytest.mark.parametrize("formulation", ["erls", "ffr"])
-@pytest.mark.parametrize("integrator", ["auto", "generalized_alpha", "rk45"])
+@pytest.mark.parametrize(
+    ("formulation", "integrator"), [("erls", "auto"), ("ffr", "auto"), ("erls", "generalized_alpha"), ("erls", "rk45")]
+)
 def test_a_step_of_the_voltage(formulation: str, integrator: str) -> None:
     """Current and rate are those of the two linear equations, to the tolerance; the torque is g i, and what the battery
     gave is in the disc, in the field and in the warm resistor.
