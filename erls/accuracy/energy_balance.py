@@ -61,8 +61,8 @@ def energy_balance(look: LookedAt) -> EnergyBalance | None:
     if not len(panels.first):
         return None
     tree = in_angles(look.formulation)
-    loops = [loop for loop in look.mechanism.loops if loop.freedom is not None]
-    idle = not any(loop.prescribed or (loop.freedom and loop.freedom.active) for loop in loops)
+    loops = [loop for loop in look.mechanism.loops if loop.freedom is not None or loop.bushing is not None]
+    idle = not any(loop.prescribed or loop.bushing or (loop.freedom and loop.freedom.active) for loop in loops)
     if look.run.conservative:
         return _over_all(look, np.zeros(panels.nodes.shape))
     if look.run.scene.record.simulation.output_step is not None:

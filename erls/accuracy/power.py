@@ -93,6 +93,9 @@ def reported_power(formulation: Formulation, t: Array, y: Array, v: Array, a: Ar
         if not joint.fixed:
             result += _power(joint, found.effort[:, k], states.angles[:, k], states.rates[:, k])
     for number, loop in enumerate(mechanism.loops):
+        if loop.bushing is not None and isinstance(formulation, ClosedChain):
+            lost = [formulation.closure(*at).efforts[number].force for at in zip(t.tolist(), y, v, strict=True)]
+            result += np.array(lost)
         if loop.freedom is None or not (loop.freedom.active or loop.prescribed):
             continue
         closed = cast(LoopFormulation, formulation)

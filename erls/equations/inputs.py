@@ -27,7 +27,7 @@ from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.curves import Curve, Piecewise
 from erls.mechanism.joints import Joint
-from erls.mechanism.loops import LoopFreedom
+from erls.mechanism.loops import Loop, LoopFreedom
 
 _see_serial, _see_joint, _see_load = python_reader(Serial), python_reader(JointRecord), python_reader(LoadRecord)
 _see_loops, _see_closing, _see_part = python_reader(Loops), python_reader(ClosingJoint), python_reader(CurvePart)
@@ -45,7 +45,7 @@ class Input:
     Attributes
     ----------
     name : str
-        Of the joint, or ``loads[k]``.
+        Of the joint, whose motor's voltage it is where that has a circuit; or ``loads[k]``.
     own : Curve or None
         What the scene says; None for nothing.
     neutral : float
@@ -80,11 +80,16 @@ def with_inputs(mechanism: Mechanism) -> tuple[Mechanism, tuple[Input, ...]]:
             return moved
         return replace(moved, drive=replace(drive, kind="torque", load=held(name, drive.load, 0.0)))
 
-    joints = tuple(driven(joint, joint.name) for joint in mechanism.joints)
-    loops = tuple(
-        loop if loop.freedom is None or loop.coupling else replace(loop, freedom=driven(loop.freedom, loop.name))
-        for loop in mechanism.loops
-    )
+    circuits = [loop.circuit for loop in mechanism.loops if loop.circuit is not None]
+    within = {name for circuit in circuits for name in (circuit.joint, circuit.charge)}
+    joints = tuple(joint if joint.name in within else driven(joint, joint.name) for joint in mechanism.joints)
+
+    def closing(loop: Loop) -> Loop:
+        if loop.freedom is None or loop.coupling is not None:
+            return loop
+        return replace(loop, freedom=driven(loop.freedom, loop.circuit.joint if loop.circuit else loop.name))
+
+    loops = tuple(map(closing, mechanism.loops))
     loads = tuple(
         replace(load, factor=held(f"loads[{load.number}]", load.factor, 1.0)) for load in mechanism.loads
     )

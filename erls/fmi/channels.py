@@ -90,7 +90,9 @@ class Channels:
 def _input(stepper: Stepper, name: str) -> Channel:
     mechanism = stepper.formulation.mechanism
     units = {joint.name: joint.freedom.units[1] for joint in mechanism.joints}
-    units |= {loop.name: loop.freedom.freedom.units[1] for loop in mechanism.loops if loop.freedom is not None}
+    for loop in mechanism.loops:
+        if loop.freedom is not None:
+            units[loop.circuit.joint if loop.circuit else loop.name] = loop.freedom.freedom.units[1]
     if name not in units:
         return Channel(f"{name}.added_factor", "1", f"added to the factor of {name}")
     return Channel(f"{name}.added_effort", units[name], f"added to what the scene drives {name} with")

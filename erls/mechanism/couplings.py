@@ -1,9 +1,9 @@
-"""Couplings: a joint coordinate that follows others by ratios, as gears, belts and differentials tie them.
+"""Couplings: a joint coordinate that follows others by ratios, as gears, belts and differentials tie them, or by a cam.
 
-    e = θ - Σ rᵢ θᵢ - offset
+    e = θ - Σ rᵢ θᵢ - c(θ_c) - offset
 
 is zero of an ideal coupling, or what an elastic one is wound up by. It acts along joint coordinates alone: on the joint
-that follows by a force, on the others by -rᵢ times that force, so that its power is that of e.
+that follows by a force, on the others by -rᵢ, or -c', times that force, so that its power is that of e.
 """
 
 from __future__ import annotations
@@ -12,15 +12,36 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from erls.mechanism.curves import Piecewise
 from erls.mechanism.joint_types import Condition, JointType, Z
 
 
 @dataclass(frozen=True)
+class Cam:
+    """A curve over a coordinate.
+
+    Attributes
+    ----------
+    curve : Piecewise
+        Over the coordinate in place of time.
+    origin, period : float
+        Where it begins, and after how much of the coordinate it repeats; 0: it does not.
+    """
+
+    curve: Piecewise
+    origin: float
+    period: float
+
+
+@dataclass(frozen=True)
 class Term:
-    """A joint coordinate and what e changes by per unit of it: 1 of the joint that follows, -rᵢ of the others."""
+    """A joint coordinate and what e changes by per unit of it, or of what a cam makes of it: 1 of the joint that
+    follows, -rᵢ and -1 of the others.
+    """
 
     joint: str
     factor: float
+    cam: Cam | None = None
 
 
 @dataclass(frozen=True)

@@ -127,6 +127,24 @@ class TorqueDrive(_Record, frozen=True, tag="torque"):
         return Drive("torque", load=build_loads(self.profiles, place, "profiles"))
 
 
+class VoltageDrive(_Record, frozen=True, tag="voltage"):
+    """A voltage over time on the circuit of the joint's motor, which needs ``resistance`` and ``torque_constant``.
+
+    Attributes
+    ----------
+    profiles : list of Load
+        One or more shapes, which add up [V].
+    """
+
+    profiles: tuple[Load, ...]
+
+    def build(self, place: Place) -> Drive:
+        """Check and build."""
+        if not self.profiles:
+            raise place.error("profiles", "empty", remedy='give a profile, or type = "free"')
+        return Drive("voltage", load=build_loads(self.profiles, place, "profiles"))
+
+
 class MotionDrive(_Record, frozen=True, tag="motion"):
     """A prescribed motion; the run reports the torque that it takes.
 
@@ -198,7 +216,7 @@ class PDDrive(_Record, frozen=True, tag="pd"):
         )
 
 
-DriveRecord = FreeDrive | TorqueDrive | MotionDrive | PDDrive
+DriveRecord = FreeDrive | TorqueDrive | VoltageDrive | MotionDrive | PDDrive
 """Drives of a scene file, told apart by ``type``."""
 
 

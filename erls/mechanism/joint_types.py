@@ -93,6 +93,16 @@ class Freedom:
 
 
 @dataclass(frozen=True)
+class ElectricFreedom(Freedom):
+    """The charge of a motor (`erls.mechanism.circuits`), which moves nothing."""
+
+    @property
+    def units(self) -> tuple[str, str]:
+        """Of charge and voltage."""
+        return "C", "V"
+
+
+@dataclass(frozen=True)
 class Condition:
     """What stays zero: c · p + ⟨C, Q⟩ - h ψ(Q), with ψ the turn about z (`erls.maths.screws`).
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.maths.so3 import Array
+from erls.mechanism.bushings import Bushing
+from erls.mechanism.circuits import Circuit
 from erls.mechanism.couplings import Coupling
 from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom, JointType
@@ -80,7 +82,8 @@ class LoopFreedom:
 class Loop:
     """A closing joint: ``outer`` moves against ``inner``, in whose axes its directions are named.
 
-    ``freedom`` is that of one that leaves one motion free. A ``coupling`` holds no frames: both ends are the ground.
+    ``freedom`` is that of one that leaves one motion free. A ``coupling``, or a ``circuit``, holds no
+    frames: both ends are the ground.
     """
 
     name: str
@@ -89,11 +92,19 @@ class Loop:
     outer: LoopEnd
     freedom: LoopFreedom | None = None
     coupling: Coupling | None = None
+    circuit: Circuit | None = None
+    bushing: Bushing | None = None
+
+    @property
+    def holds_frames(self) -> bool:
+        """Whether it is a joint."""
+        return self.coupling is None and self.circuit is None
 
     @property
     def kind(self) -> str:
         """What messages call it."""
-        return "loop" if self.coupling is None else "coupling"
+        named = (("coupling", self.coupling), ("circuit", self.circuit), ("bushing", self.bushing))
+        return next((name for name, given in named if given is not None), "loop")
 
     @property
     def sticks(self) -> bool:

@@ -83,7 +83,7 @@ class Waypoints(ProfileRecord, frozen=True, tag="waypoints"):
         """Check and build."""
         degree = place.choice("degree", self.degree, tuple(REST_TO_REST))
         values = place.quantities("values", self.values, self.values_deg)
-        return _legs(*samples(place, None, 1, self.times, values, 2), degree)
+        return legs(*samples(place, None, 1, self.times, values, 2), degree)
 
 
 class Sine(ProfileRecord, frozen=True, tag="sine"):
@@ -233,10 +233,11 @@ def rest_to_rest(place: Place, start: float, duration: float, first: float, last
     """One motion from rest to rest, its fields ``start``, ``duration`` and ``degree`` checked."""
     begun = place.time("start", start)
     times = np.array([begun, begun + place.span("duration", duration)])
-    return _legs(times, np.array([first, last]), place.choice("degree", degree, tuple(REST_TO_REST)))
+    return legs(times, np.array([first, last]), place.choice("degree", degree, tuple(REST_TO_REST)))
 
 
-def _legs(times: NDArray[np.float64], values: NDArray[np.float64], degree: int) -> Piecewise:
+def legs(times: NDArray[np.float64], values: NDArray[np.float64], degree: int) -> Piecewise:
+    """From rest to rest between values (n,), by polynomials of a degree of `REST_TO_REST`; the ends hold outside."""
     shape = np.array(REST_TO_REST[degree])
     pieces: list[ArrayLike] = [values[0]]
     for span, first, last in zip(np.diff(times), values, values[1:], strict=False):

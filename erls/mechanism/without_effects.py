@@ -10,6 +10,7 @@ import numpy as np
 
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import EFFECTS
+from erls.mechanism.joint_types import ElectricFreedom
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link, payload_invariants, truncated
 from erls.mechanism.loops import Loop, LoopFreedom
@@ -73,12 +74,14 @@ def present(mechanism: Mechanism) -> frozenset[str]:
 
 
 def _loop_without(loop: Loop, off: Set[str]) -> Loop:
-    if loop.freedom is None or loop.coupling is not None:  # elasticity is all that a coupling consists of
+    if loop.freedom is None or not loop.holds_frames:  # elasticity is all that a coupling consists of
         return loop
     return replace(loop, freedom=_joint_without(loop.freedom, off))
 
 
 def _joint_without(joint: _Acting, off: Set[str]) -> _Acting:
+    if isinstance(joint.freedom, ElectricFreedom):
+        return joint
     forces = joint.forces
     if "joint_stiffness" in off:
         forces = replace(forces, stiffness=0.0)

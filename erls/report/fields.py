@@ -89,7 +89,7 @@ _WORDS: dict[Any, str] = {
     schema.BoolType: "true or false",
     schema.AnyType: "any",
 }
-_COUNTS = {2: "two", 3: "three", 4: "four"}
+_COUNTS = {2: "two", 3: "three", 4: "four", 6: "six"}
 
 
 def field_tables() -> dict[str, str]:
@@ -200,8 +200,9 @@ def _words(kind: Any) -> str:
         return " or ".join(dict.fromkeys(parts))
     if isinstance(kind, schema.TupleType):
         inner = list(dict.fromkeys(_words(p) for p in kind.item_types))
-        if inner == ["number or three numbers"]:
-            return "three numbers or 3 × 3 numbers"
+        size = len(kind.item_types)
+        if inner == [f"number or {_COUNTS[size]} numbers"]:
+            return f"{_COUNTS[size]} numbers or {size} × {size} numbers"
         return f"{_COUNTS[len(kind.item_types)]} {inner[0]}s"
     if isinstance(kind, (schema.ListType, schema.VarTupleType)):
         return f"list of {_words(kind.item_type)}s"

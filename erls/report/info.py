@@ -116,7 +116,8 @@ def _drives(joint: Joint) -> str:
 
 def _follows(coupling: Coupling) -> str:
     """What a coupling says, and how it gives way."""
-    followed = " + ".join(f"{ratio:g} {name}" for name, ratio in coupling.follows.items())
+    parts = [f"{ratio:g} {name}" for name, ratio in coupling.follows.items()]
+    followed = " + ".join([*parts, *([f"cam on {coupling.cam.joint}"] if coupling.cam else [])])
     kind = ("play" if coupling.stops else "elastic") if coupling.elastic else "ideal"
     return f"{coupling.joint} = {followed.replace('+ -', '- ')}, {kind}"
 
@@ -144,6 +145,9 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
             for x, kind in zip(record.loops, driven, strict=True)
         )
         text += "\nloops: " + ", ".join(joined)
+    if record.bushings:
+        joined = (f"{x.name} ({x.link} to {x.to_link or 'ground'})" for x in record.bushings)
+        text += "\nbushings: " + ", ".join(joined)
     if record.couplings:
         text += "\ncouplings: " + ", ".join(f"{c.name} ({_follows(c)})" for c in record.couplings)
     text += "\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)

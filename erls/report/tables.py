@@ -161,8 +161,8 @@ def chain_report(run: ChainRun, times: Sequence[float] = ()) -> str:
         for name, moved in zip(run.joint_names, run.formulation.mechanism.joints, strict=True):
             revolute, joint = moved.freedom.turns, reduce(getitem, name.split("/"), sample["joints"])
 
-            def show(value: float, revolute: bool = revolute) -> str:
-                return f"{np.degrees(value):.4f} deg" if revolute else f"{value:.6f} m"
+            def show(value: float, revolute: bool = revolute, unit: str = moved.freedom.units[0]) -> str:
+                return f"{np.degrees(value):.4f} deg" if revolute else f"{value:.6f} {unit}"
 
             same = abs(joint["angle"] - joint["coordinate"]) < 1e-12
             coordinate = "" if same else f"theta {show(joint['coordinate'])}"

@@ -21,6 +21,8 @@ from erls.mechanism.links import Link, Payload, payload_invariants, rigid_model,
 from erls.mechanism.place import Place
 from erls.mechanism.thermal import at_temperature, unwarmed
 from erls.mechanism.without_effects import without
+from erls.scene.build_bushings import build_bushings
+from erls.scene.build_circuits import with_circuits
 from erls.scene.build_contacts import build_contacts
 from erls.scene.build_couplings import build_couplings
 from erls.scene.build_joints import build_joints, stands_on
@@ -127,7 +129,8 @@ def build_mechanism(
         bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
-    closing = build_loops(scene, chain) + build_couplings(scene)
+    chain, circuits = with_circuits(scene, chain)
+    closing = build_loops(scene, chain) + build_bushings(scene, chain) + build_couplings(scene) + circuits
     chain = without(replace(chain, loops=closing, effects=effects), ALL - effects)
     return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
 

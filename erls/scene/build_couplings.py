@@ -1,4 +1,4 @@
-"""Couplings of a scene: joint coordinates tied by ratios."""
+"""Couplings of a scene: joint coordinates tied by ratios and cams."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from erls.mechanism.joint_types import Freedom, Z
 from erls.mechanism.joints import JointForces
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.place import Place
+from erls.scene.build_cams import build_cam
 from erls.scene.build_contacts import build_stops
 from erls.scene.build_joints import angle
 from erls.scene.chain import Scene
@@ -34,7 +35,10 @@ def build_couplings(scene: Scene) -> tuple[Loop, ...]:
 
 def _coupling(record: CouplingRecord, known: dict[str, Freedom], place: Place) -> Loop:
     turns = known[record.joint].turns
-    terms = Term(record.joint, 1.0), *(Term(name, -ratio) for name, ratio in record.follows.items())
+    terms = (Term(record.joint, 1.0), *(Term(name, -ratio) for name, ratio in record.follows.items()))
+    if record.cam is not None:
+        carrier = known[record.cam.joint].turns
+        terms = (*terms, Term(record.cam.joint, -1.0, build_cam(record.cam, place.at("cam"), carrier, turns)))
     tied = Coupling(terms, angle(place, "offset", record.offset, record.offset_deg), turns)
     ground = LoopEnd(None, 0, np.eye(4))
     if not record.elastic:

@@ -49,7 +49,7 @@ def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Pla
     place = at.where
     names = [link.name for link in mechanism.links]  # those between motions of a joint are not chosen from
     number = names.index(record.link)
-    node = _node(mechanism, number, record.node, f"{place}.node")
+    node = turning_node(mechanism, number, record.node, f"{place}.node")
     if record.axis is None:  # parallel to the joint that carries the link
         axis = (frames[number] @ inverse(mechanism.joints[number].after))[:3, 2]
     else:
@@ -58,7 +58,7 @@ def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Pla
     outer = LoopEnd(number, node, pose(frames[number][:3, :3].T @ turn))
     if record.to_link:
         other = names.index(record.to_link)
-        to_node = _node(mechanism, other, record.to_node, f"{place}.to_node")
+        to_node = turning_node(mechanism, other, record.to_node, f"{place}.to_node")
         inner = LoopEnd(other, to_node, pose(frames[other][:3, :3].T @ turn))
     else:
         position = frames[number][:3, :3] @ mechanism.links[number].model.nodes[node] + frames[number][:3, 3]
@@ -99,7 +99,14 @@ def _freedom(
     return found
 
 
-def _node(mechanism: Mechanism, number: int, name: str, where: str) -> int:
+def turning_node(mechanism: Mechanism, number: int, name: str, where: str) -> int:
+    """A node of a link that turns, by its name.
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE, BAD_FIELD.
+    """
     model = mechanism.links[number].model
     known = {**{i.name: i.node for i in model.interface_nodes}, **model.node_names}
     choose(name, known, where, SceneError)

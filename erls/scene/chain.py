@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from erls.mechanism.profiles import Load as Profile
 from erls.mechanism.sensors.registry import AnySensor
+from erls.scene.bushings import Bushing
 from erls.scene.contacts import Contact
 from erls.scene.couplings import Coupling
 from erls.scene.joints import Joint, Loop
@@ -179,6 +180,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         How links start.
     loops : list of Loop
         Joints that close the chain, ``[[loops]]``.
+    bushings : list of Bushing
+        Elastic connections of nodes, ``[[bushings]]``.
     couplings : list of Coupling
         Joints that follow others by ratios, ``[[couplings]]``.
     events : list of Event
@@ -203,6 +206,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     contacts: list[Contact] = []
     initial: Initial = Initial()
     loops: list[Loop] = []
+    bushings: list[Bushing] = []
     couplings: list[Coupling] = []
     events: list[Event] = []
     sensors: list[AnySensor] = []

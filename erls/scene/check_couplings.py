@@ -7,9 +7,12 @@ from erls.mechanism.drives import MotionDrive
 from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.scene.build_joints import joint_coordinates
 from erls.scene.chain import SceneRecord
+from erls.scene.check_circuits import circuits
 from erls.scene.checks import bad, not_negative
 from erls.scene.couplings import Coupling
 from fe_import.files.toml import choose
+
+LAWS = ("dwell", "spline")  # of cams
 
 
 def coupled_coordinates(scene: SceneRecord) -> dict[str, Freedom]:
@@ -39,8 +42,14 @@ def check_couplings(scene: SceneRecord, file: str) -> None:
 def _check_coupling(coupling: Coupling, scene: SceneRecord, place: str) -> None:
     known = coupled_coordinates(scene)
     choose(coupling.joint, known, f"{place}.joint", SceneError)
-    if not coupling.follows:
-        raise bad(f"{place}.follows", "no joint to follow", None, "name one with its ratio, { shoulder = 2.0 }")
+    if not coupling.follows and coupling.cam is None:
+        remedy = "name one with its ratio, { shoulder = 2.0 }, or give a cam"
+        raise bad(f"{place}.follows", "no joint to follow", None, remedy)
+    if coupling.cam is not None:
+        choose(coupling.cam.joint, known, f"{place}.cam.joint", SceneError)
+        choose(coupling.cam.law, LAWS, f"{place}.cam.law", SceneError)
+        if coupling.cam.joint == coupling.joint:
+            raise bad(f"{place}.cam.joint", "a joint does not follow itself", coupling.joint, "name another one")
     for name, ratio in coupling.follows.items():
         where = f"{place}.follows.{name}"
         choose(name, known, f"{place}.follows", SceneError)
@@ -49,7 +58,7 @@ def _check_coupling(coupling: Coupling, scene: SceneRecord, place: str) -> None:
         if ratio == 0.0:
             remedy = "give how far the joint that follows goes per unit, or remove it"
             raise bad(where, "a ratio is not 0", ratio, remedy)
-    names = (coupling.joint, *coupling.follows)
+    names = (coupling.joint, *coupling.follows, *([coupling.cam.joint] if coupling.cam else []))
     for name in names:
         if known[name].vector:
             message = "a component of a rotation vector turns about no axis of its own"
@@ -82,5 +91,6 @@ def _check_settings(scene: SceneRecord, file: str) -> None:
         ("coordinates", s.coordinates != "independent", "use coordinates = 'independent'"),
         ("formulation", s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
     ):
-        if found and scene.couplings:
-            raise bad(f"{file}: simulation.{field}", "does not go with [[couplings]]", getattr(s, field), remedy)
+        for given, what in ((bool(scene.couplings), "[[couplings]]"), (circuits(scene), "circuits of motors")):
+            if found and given:
+                raise bad(f"{file}: simulation.{field}", f"does not go with {what}", getattr(s, field), remedy)

@@ -6,9 +6,42 @@ from erls.scene.contacts import Stops
 from erls.scene.records import Record
 
 
+class Cam(Record, frozen=True, kw_only=True):
+    """A curve through coordinates of the joint that follows, over the coordinate of another one.
+
+    Attributes
+    ----------
+    joint : str
+        The joint that carries the cam, as of ``joint`` of the coupling.
+    angles, angles_deg : list of float
+        Its coordinates, rising [rad or m], or in degrees.
+    values, values_deg : list of float
+        Lift there: what the joint that follows is at [rad or m], or in degrees.
+    law : str
+        ``dwell``: at rest at each of them, polynomials between; ``spline``: a cubic spline through them, with
+        continuous curvature.
+    degree : int
+        Of these polynomials: 3 (acceleration jumps), 5 (3-4-5 polynomial), 7 (4-5-6-7 polynomial: jerk is continuous,
+        too) or 9.
+    period, period_deg : float, optional
+        After how much of its coordinate the curve repeats [rad or m], or in degrees; a joint that turns: 360 degrees
+        unless given. 0: it does not, and the end values hold.
+    """
+
+    joint: str
+    angles: tuple[float, ...] | None = None
+    angles_deg: tuple[float, ...] | None = None
+    values: tuple[float, ...] | None = None
+    values_deg: tuple[float, ...] | None = None
+    law: str = "dwell"
+    degree: int = 5
+    period: float | None = None
+    period_deg: float | None = None
+
+
 class Coupling(Record, frozen=True, kw_only=True):
     """A joint whose coordinate follows those of others, as gears, belts, racks and differentials tie them:
-    coordinate = Σ ratio · coordinate of the others + offset.
+    coordinate = Σ ratio · coordinate of the others + lift of a cam + offset.
 
     Attributes
     ----------
@@ -18,7 +51,9 @@ class Coupling(Record, frozen=True, kw_only=True):
         The joint that follows; ``joint/coordinate`` of one with several, or a closing joint with one.
     follows : number by name
         Joints that it follows, with their ratios: how far it goes per unit of each, with the sign of its sense [rad or
-        m per rad or m]. A differential has several.
+        m per rad or m]. A differential has several; give this or ``cam``.
+    cam : Cam, optional
+        A curve that it follows.
     offset, offset_deg : float, optional
         Its coordinate where theirs are 0 [rad or m], or in degrees; 0 unless given. At the start joints that are free
         are brought to where couplings put them.
@@ -33,7 +68,8 @@ class Coupling(Record, frozen=True, kw_only=True):
 
     name: str
     joint: str
-    follows: dict[str, float]
+    follows: dict[str, float] = {}
+    cam: Cam | None = None
     offset: float | None = None
     offset_deg: float | None = None
     stiffness: float | None = None

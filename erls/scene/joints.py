@@ -82,6 +82,10 @@ class Motor(Record, frozen=True):
         Of the rotor about its axis [kg m²]; rotor_inertia · gear_ratio² is reflected to the joint.
     gear_ratio : float
         Turns of the rotor per turn of the joint, or rad/m.
+    resistance, inductance, torque_constant : float, optional
+        Of its circuit, all three or none [Ω, H, N m/A; N/A where the joint slides without a gear]: the current follows
+        the voltage with the time constant inductance / resistance, and the torque constant is that of the back-EMF, too
+        [V s/rad]. A drive then commands the voltage that would give its torque at rest; `voltage` gives it itself.
     mass : float
         Of the motor [kg].
     inertia : (3,) floats or (3, 3) floats
@@ -90,6 +94,9 @@ class Motor(Record, frozen=True):
 
     rotor_inertia: float = 0.0
     gear_ratio: float = 1.0
+    resistance: float | None = None
+    inductance: float | None = None
+    torque_constant: float | None = None
     mass: float = 0.0
     inertia: Inertia = (0.0, 0.0, 0.0)
 

@@ -19,8 +19,8 @@ DUE = 8.0 * math.pi
 
 
 def shaft(name: str, inertia: float, **more: Any) -> tuple[dict[str, Any], dict[str, Any]]:
-    """A rotor on the ground about z, on a link that carries nothing else."""
-    body = {"mass": 1.0, "inertia": [0.0, 0.0, inertia], "points": {"seat": [0.0, 0.0, 0.0]}}
+    """A rotor of 0.1 m on the ground about z, on a link that carries nothing else."""
+    body = {"mass": 1.0, "inertia": [0.0, 0.0, inertia], "points": {"seat": [0.0, 0.0, 0.0], "rim": [0.1, 0.0, 0.0]}}
     joint = {"name": name, "dh": DH, "on": "ground", "branch": {"position": [0.3, 0.0, 0.0]}, **more}
     return joint, {"name": f"{name} rotor", "rigid": body}
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
+from erls.equations.loops.bushed import bushing_gains, push_bushing
 from erls.equations.loops.closure import fed
+from erls.equations.loops.coupled import gyrate, gyration_gains
 from erls.equations.loops.records import (
     CLOSING_JOINT,
     COORDINATE,
@@ -47,6 +49,10 @@ def _push_closing(loops: Loops, reals: Array, integers: IntArray, scratch: Array
             push = read_joint(reals, integers, joint.joint).rotor * turning - state.effort[PUSH]
             for i in range(n):
                 out[i] += row[i] * push
+        if len(joint.spring) > 0:
+            push_bushing(read_loop_state(scratch, integers, loops.states + number * LOOP_STATE), out)
+        if joint.gyration.real != 0.0:
+            gyrate(joint, read_loop_state(scratch, integers, loops.states + number * LOOP_STATE), out)
 
 
 @part
@@ -117,8 +123,17 @@ def _add_gains(
             if len(joint.grip) > 0:
                 held, damped = grip_gains(joint.grip, found[RATE])
                 stiffness, damping = stiffness + held, damping + damped
-            add_outer(row, stiffness, k)
-            add_outer(row, damping, c)
+            if joint.gyration.real != 0.0:
+                gyration_gains(joint, state, stiffness, damping, k, c)
+            else:
+                add_outer(row, stiffness, k)
+                add_outer(row, damping, c)
+        elif len(joint.spring) > 0:
+            state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
+            bushing_gains(joint, state, k, c)
+        elif joint.gyration.real != 0.0:
+            state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
+            gyration_gains(joint, state, 0.0, 0.0, k, c)
 
 
 @kernel(contract.STIFFNESS_AND_DAMPING, counted=False)

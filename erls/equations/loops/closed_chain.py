@@ -19,6 +19,7 @@ import scipy.linalg as la
 
 from erls.equations.formulation import ContactSeries, Energy, LoopForce, Reaction, State
 from erls.equations.linearization import Linearization
+from erls.equations.loops.circuits import add_motors
 from erls.equations.loops.failures import assembled_warning, comes_apart, locks, warnings_of
 from erls.equations.loops.friction import forced, freely
 from erls.equations.loops.gripped import by_states, gripped, held_friction, loop_grips, resting, rubbed
@@ -338,13 +339,16 @@ class ClosedChain(Tied):
         y, v = self._closed_at(t, y, v)
         result = energy_series(self.bare, t, y, v)
         free = {k: loop.freedom for k, loop in enumerate(self.mechanism.loops) if loop.freedom is not None}
-        if not any(found.rotor_inertia or found.forces.stiffness or found.forces.stops for found in free.values()):
+        bushings = [k for k, loop in enumerate(self.mechanism.loops) if loop.bushing is not None]
+        stored = (found.rotor_inertia or found.forces.stiffness or found.forces.stops for found in free.values())
+        if not bushings and not any(stored):
             return result
         for i, at in enumerate(t.tolist()):
             efforts = self.closure(at, y[i], v[i]).efforts
             for k, found in free.items():
                 result[i, 0] += 0.5 * found.rotor_inertia * efforts[k].rate ** 2
                 result[i, 3] += found.forces.energy(efforts[k].coordinate)
+            result[i, 3] += sum(efforts[k].coordinate for k in bushings)
         return result
 
     def contact_series(self, t: Array, y: Array, v: Array) -> ContactSeries:
@@ -370,6 +374,8 @@ class ClosedChain(Tied):
         """(6,) what every closing joint does to its link, in the axes of the outer frame: reactions, drives, rotors."""
         result = self.rows.wrenches(found, multipliers)
         for k, (loop, effort) in enumerate(zip(self.mechanism.loops, found.efforts, strict=True)):
+            if loop.bushing is not None:
+                result[k] += effort.wrench
             if (free := loop.freedom) is not None:
                 along = free.freedom.row
                 turning = float(found.moves[k][along, self.bare.free] @ a) + effort.turning
@@ -424,6 +430,7 @@ class ClosedChain(Tied):
             if joint.drive.prescribed:
                 result.effort[:, k] += loads[:, k]
         result.effort[:] += friction_within
+        add_motors(self.mechanism, states.rates, result.effort)
         if self.dry is not None:  # those that stick bear loads, too
             joints = self.bare.free_joints[self.dry.places]
             result.effort[:, joints] += np.where(v[:, self.dry.places] == 0.0, loads[:, joints], 0.0)

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import Array, IntArray
-from erls.equations.loops.coupled import couple
+from erls.equations.loops.bushed import bush
+from erls.equations.loops.coupled import couple, link_circuit
 from erls.equations.loops.records import (
     CLOSING_JOINT,
     CLOSURE,
@@ -224,7 +225,9 @@ def _close(
 ) -> None:  # fmt: skip
     joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
     state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
-    if len(joint.factors) > 0:
+    if joint.gyration.real != 0.0:
+        link_circuit(joint, y, v, state)
+    elif len(joint.factors) > 0:
         couple(loops, reals, integers, scratch, joint, t, y, v, state)
     else:
         _between(joint, room.frames, state)
@@ -241,6 +244,8 @@ def _close(
         room.violation[at], room.rate[at], room.bias[at] = value, rate, bend
         if loops.used[at] >= 0:
             pull_back(gradient, state.moves, room.gradient[loops.used[at]])
+    if len(joint.spring) > 0:
+        bush(joint, state)
     if joint.along >= 0:
         _act(loops, reals, integers, scratch, joint, t, y, state)
 

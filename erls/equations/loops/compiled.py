@@ -118,7 +118,8 @@ class Given:
     @property
     def active(self) -> bool:
         """Whether any force that is no reaction, or rotor, acts along a closing joint."""
-        return any(loop.freedom is not None and loop.freedom.active for loop in self.rows.loops)
+        acting = (loop.freedom is not None and loop.freedom.active for loop in self.rows.loops)
+        return any(acting) or any(loop.circuit or loop.bushing for loop in self.rows.loops)
 
 
 def _numbers(y: Array) -> Array:
@@ -245,7 +246,7 @@ class CompiledLoops(CompiledSystem):
             outer,
             moves,
             [state.left[:9].reshape(3, 3).copy() for state in states],
-            [Effort(*state.effort.tolist()) for state in states],
+            [_effort(loop, state) for loop, state in zip(self.given.rows.loops, states, strict=True)],
         )
 
     def closed(self, t: float, y: Array, v: Array) -> tuple[Array, Array]:
@@ -384,28 +385,44 @@ def _joint(memory: Memory, given: Given, number: int, loop: Loop) -> own.Closing
         entries=np.array([row.entries for row in found]).reshape(-1, 3, 3),
         pitches=np.array([row.pitch for row in found]),
         grip=np.zeros(0) if free is None else free.grip(given.reach),
+        spring=np.zeros((0, 0)) if loop.bushing is None else loop.bushing.stiffness,
+        damper=np.zeros((0, 0)) if loop.bushing is None else loop.bushing.damping,
+        gyration=0.0 if loop.circuit is None else loop.circuit.gyration,
         offset=0.0 if loop.coupling is None else loop.coupling.offset,
         factors=np.array([term.factor for term in _terms(loop)]),
+        origins=np.array([0.0 if term.cam is None else term.cam.origin for term in _terms(loop)]),
+        periods=np.array([0.0 if term.cam is None else term.cam.period for term in _terms(loop)]),
         **_coordinates(memory, given, loop),
     )
 
 
+def _effort(loop: Loop, state: own.LoopState) -> Effort:
+    """Of a circuit charge, current and voltage."""
+    place, rate, turning, push = state.effort.tolist()
+    if loop.circuit is not None:
+        place, rate = float(state.pose[9]), float(state.twist[5])
+    return Effort(place, rate, turning, push, state.wrench.copy())
+
+
 def _terms(loop: Loop) -> tuple[Term, ...]:
+    if loop.circuit is not None:
+        return Term(loop.circuit.joint, 1.0), Term(loop.circuit.charge, 1.0)
     return () if loop.coupling is None else loop.coupling.terms
 
 
 def _coordinates(memory: Memory, given: Given, loop: Loop) -> dict[str, IntArray]:
     """Where a coupling finds the coordinates that it ties; curves of those that are prescribed are put into memory."""
-    columns, curves, others = list[int](), list[int](), list[int]()
+    columns, curves, others, cams = list[int](), list[int](), list[int](), list[int]()
     closing, turns = [other.name for other in given.rows.loops], given.turns
     prescribed = [k for k, motion in enumerate(turns.motions) if motion is not None]
     for term in _terms(loop):
         tree = given.joints.index(term.joint) if term.joint in given.joints else -1
         others.append(closing.index(term.joint) if tree < 0 else -1)
         curves.append(put_curve(memory, turns.motions[tree]) if tree in prescribed else -1)
+        cams.append(put_curve(memory, None if term.cam is None else term.cam.curve))
         own = int(turns.places[tree]) if tree >= 0 else -1
         columns.append(given.tree.size + prescribed.index(tree) if tree in prescribed else own)
     return {
         name: np.array(found, dtype=np.int64)
-        for name, found in (("columns", columns), ("curves", curves), ("others", others))
+        for name, found in (("columns", columns), ("curves", curves), ("others", others), ("cams", cams))
     }

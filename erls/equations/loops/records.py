@@ -124,13 +124,20 @@ class ClosingJoint(NamedTuple):
         is prescribed.
     grip : (9,) array
         Friction along it that may stick, as in `erls.maths.contact_law`; empty without.
+    spring, damper : (6, 6) arrays
+        Of a bushing; empty of others.
+    gyration : float
+        Of a circuit: torque per current; 0 of all others.
     offset : float
         Of a coupling: of the coordinate that follows.
     factors : (f,) array
-        Of a coupling what it changes by per unit of each coordinate; empty of a joint.
-    columns, curves, others : (f,) int arrays
+        Of a coupling what it changes by per unit of each coordinate; of a circuit there are two, the joint's and the
+        charge; empty of a joint.
+    origins, periods : (f,) arrays
+        Of cams: where their curves begin, and after how much of the coordinate they repeat; 0 where they do not.
+    columns, curves, others, cams : (f,) int arrays
         Place of each coordinate among velocities and prescribed rates; of its curve, -1 unless it is prescribed; number
-        of the closing joint whose coordinate it is, -1 of joints of the tree.
+        of the closing joint whose coordinate it is, -1 of joints of the tree; place of the curve of a cam, or -1.
     """
 
     outer: int
@@ -149,11 +156,17 @@ class ClosingJoint(NamedTuple):
     entries: Stack
     pitches: Vector
     grip: Vector
+    spring: Matrix
+    damper: Matrix
+    gyration: float
     offset: float
     factors: Vector
+    origins: Vector
+    periods: Vector
     columns: Indices
     curves: Indices
     others: Indices
+    cams: Indices
 
 
 class GrippedJoint(NamedTuple):
@@ -185,7 +198,10 @@ class LoopState(NamedTuple):
     gradients : (c, 6) array
         Of conditions over the twist.
     effort : (4,) array
-        Coordinate, rate, its derivative at zero accelerations, force along it.
+        Coordinate, rate, its derivative at zero accelerations, force along it. Of a bushing elastic energy, and the
+        power of its damper in place of the force.
+    wrench : (6,) array
+        What a bushing does to the outer frame.
     spare : (6,) array
     """
 
@@ -198,6 +214,7 @@ class LoopState(NamedTuple):
     moves: Matrix
     gradients: Matrix
     effort: Vector
+    wrench: Vector
     spare: Vector
 
 
@@ -250,9 +267,9 @@ class LoopRoom(NamedTuple):
 def loop_state(columns: int, conditions: int) -> LoopState:
     """Memory for a loop."""
     pose, left = np.zeros(12), np.zeros(12)
-    six = [np.zeros(6) for _ in range(5)]
+    six = [np.zeros(6) for _ in range(6)]
     moves, gradients = np.zeros((6, columns)), np.zeros((conditions, 6))
-    return LoopState(pose, six[0], six[1], left, six[2], six[3], moves, gradients, np.zeros(4), six[4])
+    return LoopState(pose, six[0], six[1], left, six[2], six[3], moves, gradients, np.zeros(4), six[5], six[4])
 
 
 def room(ends: int, columns: int, n: int, m: int, r: int, gripped: int) -> LoopRoom:

@@ -25,12 +25,15 @@ class Effort:
         Second derivative of the coordinate at zero accelerations.
     force : float
         Of drive, spring, damper and friction; a prescribed motion's own left out [N m or N].
+    wrench : (6,) array
+        Of a bushing, on the outer frame; its ``coordinate`` is elastic energy [J], its ``force`` a damper's power [W].
     """
 
     coordinate: float
     rate: float
     turning: float
     force: float
+    wrench: Array
 
 
 @dataclass(frozen=True)

@@ -66,7 +66,7 @@ def _parts(curve: Curve) -> list[Piecewise | Harmonic]:
 
 
 @part
-def _passed(knots: Array, t: float) -> int:
+def passed(knots: Array, t: float) -> int:
     """Number of knots at or before ``t``, within the tolerance for events."""
     limit = t + (1e-13 + 1e-14 * abs(t))
     low, high = 0, len(knots)
@@ -85,7 +85,7 @@ def curve(reals: Array, integers: IntArray, at: int, t: float) -> tuple[Any, Any
     value = rate = acceleration = 0.0 * reals[0]
     for number in range(integers[at]):
         term = read_part(reals, integers, at + 1 + PART * number)
-        knots, piece = term.knots, _passed(term.knots, t)
+        knots, piece = term.knots, passed(term.knots, t)
         if term.kind == PIECEWISE:
             x = t - knots[max(piece - 1, 0)] if len(knots) else t + 0.0 * reals[0]
             coefficients = term.pieces[piece]

@@ -107,7 +107,7 @@ class ChainRun(ChainMotion):
     @property
     def loop_names(self) -> tuple[str, ...]:
         """Closing joints."""
-        return tuple(loop.name for loop in self.formulation.mechanism.loops if loop.coupling is None)
+        return tuple(loop.name for loop in self.formulation.mechanism.loops if loop.holds_frames)
 
     @property
     def coupling_names(self) -> tuple[str, ...]:
@@ -153,7 +153,7 @@ class ChainRun(ChainMotion):
         return self._of_loop(loop, t, lambda chain, *at: chain.loop_effort(*at))
 
     def _of_loop(self, loop: str, t: ArrayLike, what: Callable[..., float]) -> Array:
-        names = [x.name for x in self.formulation.mechanism.loops if x.freedom is not None and x.coupling is None]
+        names = [x.name for x in self.formulation.mechanism.loops if x.freedom is not None and x.holds_frames]
         choose(loop, names, "loop", SceneError)
         number, chain = self.loop_names.index(loop), solved(self.formulation)
         _, flat, y, v = self._interpolated(t)
@@ -197,6 +197,7 @@ class ChainRun(ChainMotion):
         joints += [x.freedom for x in mechanism.loops if x.freedom is not None]
         passive = all(_passive(j) for j in joints)
         damped = any(link.damping.any() for link in mechanism.links)
+        damped = damped or any(x.bushing is not None and x.bushing.damping.any() for x in mechanism.loops)
         lossy = any(c.friction or c.law.loss for c in mechanism.contacts)
         return passive and not (damped or lossy or mechanism.loads) and conserves_energy(mechanism.effects)
 

@@ -109,7 +109,8 @@ class ChainFinder:
             if own.name == joint:
                 inner = own.coordinates.get(coordinate, Coordinate())
                 return float(inner.motor.gear_ratio if coordinate else own.motor.gear_ratio)
-        return next(float(loop.motor.gear_ratio) for loop in record.loops if loop.name == joint)
+        own_ratio = (float(loop.motor.gear_ratio) for loop in record.loops if loop.name == joint)
+        return next(own_ratio, 1.0)  # charges of motors have none
 
     def site(self, point: str, quantity: str, element: int | None, place: Place) -> Site:
         """A place with recovery maps."""
