@@ -9,8 +9,8 @@ several runs, all preparation from a built system on included, compilation not. 
 at equal error; aim: three times; cost linear in the number of elements.
 
 With `--shells` instead strips and square plates on a hinge, links of shells, 50 steps of 1 ms beside beams along the
-strip: velocities, cost per step and velocity, the width of the band and its numbers, which are those of its factors,
-beside what SuperLU fills for the same matrix, and the times of derivatives and of one factorization of each.
+strip: velocities, cost per step and velocity, the time of derivatives, and of one factorization in a band, in fronts
+and by SuperLU, with the numbers that each holds.
 """
 
 from __future__ import annotations
@@ -37,6 +37,8 @@ import test_shell_chains as shell_chains
 from link_files import write_toml
 from shell_meshes import shell_grid
 
+from erls.equations.nodal import elimination
+from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.blocks import blocks
 from erls.equations.nodal.equations import Nodal
 from erls.equations.nodal.matrix import factor
@@ -44,6 +46,7 @@ from erls.equations.nodal.nodes import numbers_of
 from erls.integrate.base import hermite
 from erls.integrate.constrained import ConstrainedOptions, ConstrainedSolution
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
+from erls.maths.so3 import Array
 from erls.scene.build import build_mechanism
 from erls.scene.read import load_chain
 
@@ -128,15 +131,18 @@ def pendulums(elements: list[int], repeat: int, exudyn: Any) -> None:
 
 
 def shells(repeat: int) -> None:
-    """Cost of links of shells and of beams, and what a band of their matrices takes beside sparse factors."""
-    heads = f"{'velocities':>11}{'ms/step':>9}{'µs/step/vel.':>14}{'factored/step':>15}{'derivatives ms':>16}"
-    print(f"{'link':<22}{heads}{'band':>6}{'MB':>8}{'SuperLU MB':>12}{'band ms':>9}{'SuperLU ms':>12}")
+    """Cost of links of shells and of beams, and what a band of their matrices takes beside fronts and SuperLU."""
+    heads = f"{'velocities':>11}{'ms/step':>9}{'µs/step/vel.':>14}{'factored':>10}{'takes':>8}{'derivatives ms':>16}"
+    kinds = "".join(f"{f'{name} MB':>9}{f'{name} ms':>9}" for name in ("", "f.", "SLU"))
+    print(f"{'link':<16}{heads}{'band':>6}{kinds}")
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         for elements in (16, 64):
             section = {"shape": "rectangular", "width": 0.06, "height": 0.003}
-            frame = {"nodes": {"root": [0, 0, 0], "tip": [0.6, 0, 0]},
-                     "members": [{"from": "root", "to": "tip", "section": "s", "material": "m", "elements": elements}]}
+            frame = {
+                "nodes": {"root": [0, 0, 0], "tip": [0.6, 0, 0]},
+                "members": [{"from": "root", "to": "tip", "section": "s", "material": "m", "elements": elements}],
+            }
             ends = [{"name": end, "node": end} for end in ("root", "tip")]
             write_toml(folder / "link.toml", {"materials": {"m": shell_chains.ALU}, "sections": {"s": section},
                                               "frame": frame, "interfaces": ends})  # fmt: skip
@@ -155,8 +161,9 @@ def _place(across: float, a: float, b: float) -> tuple[float, float, float]:
 def _cost(name: str, folder: Path, repeat: int) -> None:
     """A row of `shells`."""
     scene = load_chain(shell_chains.arm(folder, "nodal"))
-    formulation = Nodal(build_mechanism(scene).mechanism)
-    system, rest, step = formulation.system, np.zeros(formulation.system.size), 1e-3
+    mechanism = build_mechanism(scene).mechanism
+    system = Nodal(mechanism).system
+    rest, step = np.zeros(system.size), 1e-3
     options = ConstrainedOptions(step=step)
     found, spent = least(repeat, partial(timed, partial(lie_generalized_alpha, system, (0, 0.05), system.start, rest,
                                                         options)))  # fmt: skip
@@ -165,6 +172,27 @@ def _cost(name: str, folder: Path, repeat: int) -> None:
     stiffness, _ = system.stiffness_and_damping(0.0, system.start, rest, rest, multipliers)
     rows = sp.coo_array(system.constraint_matrix(0.0, system.start))
     whole = sp.block_array([[mass + 0.3 * step**2 * stiffness, rows.T], [rows, None]]).tocoo()
+    cost = 1e3 * spent / found.work.steps
+    print(f"{name:<16}{system.size:11d}{cost:9.3f}{1e3 * cost / system.size:14.2f}", end="")
+    print(f"{found.work.factorizations / 50:10.2f}{'band' if system.elimination.width >= 0 else 'fronts':>8}", end="")
+    chosen = elimination.DEARER
+    for dearer in (np.inf, 0.0):
+        elimination.DEARER = dearer
+        own = Nodal(mechanism).system
+        derivatives, factors = _factored(own, rest, 0.3 * step**2, 2 * repeat)
+        stored = 8e-6 * (own.elimination.entries + own.elimination.stack)
+        if dearer:
+            print(f"{derivatives:16.1f}{own.elimination.width:6d}", end="")
+        print(f"{stored:9.1f}{factors:9.1f}", end="")
+    elimination.DEARER = chosen
+    begun = time.process_time()
+    settings = {"SymmetricMode": True, "DiagPivotThresh": 0.01}
+    sparse = sla.splu(whole.tocsc(), permc_spec="MMD_AT_PLUS_A", options=settings)
+    print(f"{(sparse.L.nnz + sparse.U.nnz) * 12e-6:9.1f}{1e3 * (time.process_time() - begun):9.1f}", flush=True)
+
+
+def _factored(system: NodalSystem, rest: Array, beta: float, repeat: int) -> tuple[float, float]:
+    """Least milliseconds of processor time for derivatives, and for factors without them."""
     factors, memory = np.zeros(system.flat.factors), (system.flat.reals, system.flat.integers, system.flat.scratch)
     system.residual(0.0, system.start, rest, rest)
     start, times = numbers_of(system.start), np.zeros((repeat + 1, 2))
@@ -172,17 +200,10 @@ def _cost(name: str, folder: Path, repeat: int) -> None:
         begun = time.process_time()
         blocks(*memory, 0)
         row[0] = time.process_time() - begun
-        factor(*memory, 0.0, start, rest, 0.0, 0.3 * step**2, factors)
-        row[1] = time.process_time() - begun - 2 * row[0]
-    derivatives, banded = 1e3 * times.min(axis=0)
-    begun = time.process_time()
-    settings = {"SymmetricMode": True, "DiagPivotThresh": 0.01}
-    sparse = sla.splu(whole.tocsc(), permc_spec="MMD_AT_PLUS_A", options=settings)
-    sparse_ms, filled = 1e3 * (time.process_time() - begun), (sparse.L.nnz + sparse.U.nnz) * 12 / 1e6
-    cost = 1e3 * spent / found.work.steps
-    counts = f"{system.size:11d}{cost:9.3f}{1e3 * cost / system.size:14.2f}{found.work.factorizations / 50:15.2f}"
-    stored = factors.nbytes / 1e6
-    print(f"{name:<22}{counts}{derivatives:16.1f}{system.width:6d}{stored:8.1f}{filled:12.1f}{banded:9.1f}{sparse_ms:12.1f}")
+        factor(*memory, 0.0, start, rest, 0.0, beta, factors)
+        row[1] = time.process_time() - begun - row[0]
+    derivatives, both = 1e3 * times.min(axis=0)
+    return derivatives, both - derivatives
 
 
 def _tip_distance(rows: np.ndarray) -> float:

@@ -1,5 +1,7 @@
 from .derivatives import modal_derivatives as modal_derivatives
 from .description.link import load_link as load_link
+from .made import link_from_matrices as link_from_matrices
+from .made import make_link as make_link
 from .modal.file import read_modal_file as read_modal_file
 from .modal.file import write_modal_file as write_modal_file
 from .modal.model import ModalModel as ModalModel

@@ -151,11 +151,25 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
         health=checks,
         lines=model.lines,
         triangles=model.triangles,
+        heights=_heights(model),
         provenance={**provenance(link, model, basis.selection), "second_order": statement, **told},
         second_order=field,
         recovery=None if wanted is None else recovery_maps(model, shapes, wanted, where),
         thermal=thermal,
     )
+
+
+def _heights(model: FEModel) -> Array:
+    """(n, 2) of shells above the nodes; nodes that couplings add have none."""
+    if model.kind != "shell":
+        return np.zeros((0, 2))
+    from fe_import.elements.shell_stress import ShellStress  # frames have no use for it
+
+    assert isinstance(model.stress, ShellStress)
+    found = np.zeros((len(model.nodes), 2))
+    own = model.stress.heights
+    found[: len(own)] = own
+    return found
 
 
 def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-import scipy.sparse as sp
 
-from fe_import.description.check import check_link
 from fe_import.description.link import LinkFile
 from fe_import.description.records import LinkDescription
 from fe_import.errors import Cause, FEImportError
-from fe_import.files.toml import choose, convert
+from fe_import.files.toml import choose
+from fe_import.made import content_of, described
 from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 from fe_import.models.model import add_masses, to_si
@@ -90,9 +88,9 @@ def link_from_skfem(
     model: FEModel
     if is_basis:
         if stiffness is None:
-            stiffness, mass = _assembled(source, _description({**data, "solid": {"mesh": ""}}))
+            stiffness, mass = _assembled(source, described({**data, "solid": {"mesh": ""}}, _WHERE))
         data.pop("materials", None)
-        description = _description({**data, "matrices": {"format": "scikit-fem", "files": {}}})
+        description = described({**data, "matrices": {"format": "scikit-fem", "files": {}}}, _WHERE)
         from fe_import.exports.skfem_basis import skfem_export
         from fe_import.models.matrices import export_model
 
@@ -100,25 +98,19 @@ def link_from_skfem(
     else:
         given = data.get("solid", {})
         data["solid"] = {"mesh": "", "material": "m", **(given if isinstance(given, Mapping) else {})}
-        description = _description(data)
+        description = described(data, _WHERE)
         from fe_import.mesh.skfem_meshes import solid_mesh
         from fe_import.models.meshed import mesh_model
 
         named = mesh.with_boundaries(facets) if facets else mesh
         model = mesh_model(solid_mesh(named, _WHERE), description, _WHERE)
     model = to_si(add_masses(model, description.masses, _WHERE), description, _WHERE)
-    return reduce_model(model, LinkFile(Path(_WHERE), description, _content(model)))
+    return reduce_model(model, LinkFile(Path(_WHERE), description, content_of(model)))
 
 
 def _fault(message: str, value: Any) -> FEImportError:
     remedy = "give a mesh and a material, or a Basis with stiffness and mass"
     return FEImportError(Cause.BAD_FIELD, message, where=_WHERE, value=value, remedy=remedy)
-
-
-def _description(data: dict[str, Any]) -> LinkDescription:
-    description = convert(data, LinkDescription, _WHERE)
-    check_link(description, _WHERE)
-    return description
 
 
 def _faces(mesh: Any, interfaces: Mapping[str, Any]) -> tuple[dict[str, Any], list[dict[str, Any]]]:
@@ -155,13 +147,3 @@ def _assembled(basis: Any, description: LinkDescription) -> tuple[Any, Any]:
     m = description.materials["m"]
     mass = skfem.BilinearForm(lambda u, v, w: m.density * dot(u, v)).assemble(basis)
     return linear_elasticity(*lame_parameters(m.youngs_modulus, m.poissons_ratio)).assemble(basis), mass
-
-
-def _content(model: FEModel) -> bytes:
-    """What a link depends on that no file holds."""
-    digest = hashlib.sha256(np.ascontiguousarray(model.nodes).tobytes())
-    for matrix in (model.mass, model.stiffness):
-        canonical = sp.csc_array(matrix)
-        for part in (canonical.indptr, canonical.indices, canonical.data):
-            digest.update(np.ascontiguousarray(part).tobytes())
-    return digest.digest()

@@ -18,6 +18,9 @@ import pytest
 for name in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
 
+# commands that tests start find the byte code of those before them
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 # reductions made by tests go to a cache of their own, shared by the workers of one session
 os.environ.setdefault("ERLS_CACHE", os.path.join(tempfile.gettempdir(), f"erls-test-cache-{os.getuid()}"))
 # compiled code lies there even for tests that give reductions an empty cache

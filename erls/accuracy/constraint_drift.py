@@ -41,7 +41,9 @@ def constraint_drift(look: LookedAt) -> Drift | None:
     """Of a run; None where its coordinates cannot break a constraint."""
     if look.nodal is not None:
         return _of_nodes(look.nodal, look)
-    return _of_loops(look.formulation, look) if isinstance(look.formulation, ClosedChain) else None
+    if not isinstance(look.formulation, ClosedChain) or not look.formulation.rows.names:
+        return None  # elastic couplings tie nothing
+    return _of_loops(look.formulation, look)
 
 
 def _at(look: LookedAt) -> IntArray:

@@ -82,7 +82,7 @@ def optimize(
     if scene is not None and found.outcomes:
         best = found.best
         note = f"{loaded.name}, {best.method}: {best.status}, objective {best.objective:.6g}\nwritten by erls"
-        write_copy(scene, given, [*loaded.record.set, *loaded.overrides(best.x)], note)
+        write_copy(scene, given, [*found.problem.record.set, *found.problem.overrides(best.x)], note)
     if json:
         print_json(told)
     else:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 import shutil
+from collections.abc import Callable
 from pathlib import Path
 from typing import Literal
 
@@ -22,6 +23,8 @@ def new(
 ) -> None:
     """Write a scene to start from, with its links, comments that say what to change, and the commands that run it.
 
+    Beside it lie the schemas that its files name in their first lines, for editors that complete and check TOML.
+
     Parameters
     ----------
     kind
@@ -33,7 +36,7 @@ def new(
         Print one JSON object.
     """
     target = Path(kind) if folder is None else folder
-    _copied(_shipped() / "start" / kind, target)
+    _copied(_shipped() / "start" / kind, target, _with_schemas)
     scene = target / "scene.toml"
     if json:
         return print_json({"kind": kind, "folder": str(target), "scene": str(scene), "files": _files(target)})
@@ -152,8 +155,21 @@ def _files(folder: Path) -> list[str]:
     return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
 
 
-def _copied(source: Path, target: Path) -> None:
-    """Copy a folder, whole or not at all; nothing is replaced."""
+def _with_schemas(folder: Path) -> None:
+    """The schemas of a scene and its links beside them, and first lines that name them."""
+    from erls.cli.reports import dumped
+    from erls.report.schema import json_schema
+
+    for kind, files in {"scene": [folder / "scene.toml"], "link": sorted(folder.glob("links/*.toml"))}.items():
+        schema = folder / f"{kind}.schema.json"
+        schema.write_text(dumped(json_schema(kind)), encoding="utf-8")
+        for file in files:
+            text, up = file.read_text(encoding="utf-8"), "." if file.parent == folder else ".."
+            file.write_text(f"#:schema {up}/{schema.name}\n{text}", encoding="utf-8")
+
+
+def _copied(source: Path, target: Path, finish: Callable[[Path], None] | None = None) -> None:
+    """Copy a folder, and finish it, whole or not at all; nothing is replaced."""
     from erls.files.output import not_writable, temporary_name
 
     if target.exists() or target.is_symlink():
@@ -161,6 +177,8 @@ def _copied(source: Path, target: Path) -> None:
     partial = temporary_name(target)
     try:
         shutil.copytree(source, partial)
+        if finish is not None:
+            finish(partial)
         partial.rename(target)
     except OSError as problem:
         raise not_writable(target, problem, "name a folder that can be made") from None

@@ -218,6 +218,16 @@ class Modular(Protocol):
         """These modules, from the one that takes longest."""
 
 
+@runtime_checkable
+class SurfaceStressed(Protocol):
+    """A formulation whose own elements tell the stress of links, where modal ones have it recovered."""
+
+    def surface_stress(self, link: int, y: Array, v: Array) -> Array | None:
+        """(k, n, 3, 6) stress xx, yy, zz, xy, yz, zx at bottom, middle and top of the nodes of a link's model, in
+        mesh axes [Pa], of states (k, ...); None of a link that is not made of shells, or whose shells do not tell.
+        """
+
+
 class TreeFormulation(Formulation, SecondOrderSystem, Protocol):
     """A formulation whose coordinates can be tied by loops: (θ, elastic), of which ``free`` are independent.
 

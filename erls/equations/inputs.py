@@ -82,7 +82,7 @@ def with_inputs(mechanism: Mechanism) -> tuple[Mechanism, tuple[Input, ...]]:
 
     joints = tuple(driven(joint, joint.name) for joint in mechanism.joints)
     loops = tuple(
-        loop if loop.freedom is None else replace(loop, freedom=driven(loop.freedom, loop.name))
+        loop if loop.freedom is None or loop.coupling else replace(loop, freedom=driven(loop.freedom, loop.name))
         for loop in mechanism.loops
     )
     loads = tuple(

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError
+from erls.importers.mimic import couplings_of, follows
 from erls.importers.urdf import UrdfJoint, UrdfRobot, angles_of
 from erls.maths.so3 import Array
 from erls.scene.read import checked
@@ -189,13 +190,16 @@ def imported(
     seats = {body.name: _seats(body, moving) for body in [base, *moving]}
     files: dict[str, str] = {}
     links = [_link(body, seats[body.name], flexible.get(body.name, ""), files, told) for body in moving]
-    joints = [_joint(body, base.name if not floating else "", seats, hold, stops) for body in moving]
+    own = [body.joint for body in moving if body.joint is not None]
+    held = {joint.name for joint in own if hold and not follows(joint, own)}
+    joints = [_joint(body, base.name if not floating else "", seats, held, stops) for body in moving]
+    couplings, alone = couplings_of(own)
     points = [p for body in moving for p in _points(body, seats[body.name], flexible.get(body.name, ""), told)]
-    told = [*robot.told, *told]
+    told = [*robot.told, *told, *alone]
     remarks = [f"# {robot.name}: imported from {source.name}. Mesh frames are the frames of its links."]
     remarks += [f"# - {text}" for text in told]
     head = f"name = {_text(robot.name)}\ngravity = [0.0, 0.0, -9.81]\n\n[simulation]\nduration = 1.0\n"
-    scene = "\n".join(["\n".join(remarks), head, *joints, *links, *points])
+    scene = "\n".join(["\n".join(remarks), head, *joints, *links, *points, *couplings])
     if not any(flexible.values()):  # those that are must be there first
         checked(tomllib.loads(scene), folder / "scene.toml", str(source))
     return Imported(scene, files, tuple(moving), tuple(told))
@@ -215,7 +219,7 @@ def _upright(axis: Array) -> Array:
     return np.column_stack([x, np.cross(axis, x), axis])
 
 
-def _joint(body: Body, base: str, seats: Mapping[str, Mapping[str, Array]], hold: bool, stops: bool) -> str:
+def _joint(body: Body, base: str, seats: Mapping[str, Mapping[str, Array]], held: set[str], stops: bool) -> str:
     joint = body.joint
     assert joint is not None
     upright = _upright(joint.axis)
@@ -229,7 +233,7 @@ def _joint(body: Body, base: str, seats: Mapping[str, Mapping[str, Array]], hold
     lines.append(f"branch = {{ position = {place}, rotation_deg = {_numbers(turn)} }}")
     lines.append('dh = { convention = "modified" }')
     if joint.type in ("revolute", "continuous", "prismatic"):
-        lines += _acting(joint, hold, stops)
+        lines += _acting(joint, joint.name in held, stops)
     return "\n".join(lines) + "\n"
 
 

@@ -70,7 +70,9 @@ class UrdfJoint:
     damping, friction : float
         [N m s/rad or N s/m; N m or N]
     mimics : str
-        The joint that it should follow; empty for none.
+        The joint that it follows; empty for none.
+    multiplier, offset : float
+        Its coordinate is multiplier · that of the other one + offset [rad or m].
     """
 
     name: str
@@ -86,6 +88,8 @@ class UrdfJoint:
     damping: float
     friction: float
     mimics: str
+    multiplier: float = 1.0
+    offset: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -133,10 +137,6 @@ def read_urdf(path: Path) -> UrdfRobot:
     by_name = {link.name: link for link in links}
     ordered, top = _tree(by_name, joints, path)
     told = [f"{count} × <{name}> not used: nothing that moves depends on it" for name, count in sorted(ignored.items())]
-    for joint in (joint for joint in ordered if joint.mimics):
-        told.append(
-            f"joint {joint.name!r} should follow {joint.mimics!r}: mimic is not known here, it moves alone"
-        )
     return UrdfRobot(root.get("name") or path.stem, by_name, tuple(ordered), top, tuple(told))
 
 
@@ -211,7 +211,7 @@ def _joint(element: ET.Element, path: Path) -> UrdfJoint:
     for side, value in zip(("damping", "friction"), resisting, strict=True):
         if value < 0:
             raise _fault(path, f"{where}: {side}", "cannot be negative", value, "mend it")
-    turns_freely = kind == "continuous"
+    multiplier, turns_freely = _maybe(mimic, "multiplier", path, f"{where}: mimic"), kind == "continuous"
     return UrdfJoint(
         name=name,
         type=kind,
@@ -226,6 +226,8 @@ def _joint(element: ET.Element, path: Path) -> UrdfJoint:
         damping=resisting[0],
         friction=resisting[1],
         mimics="" if mimic is None else mimic.get("joint", "?"),
+        multiplier=1.0 if multiplier is None else multiplier,
+        offset=_maybe(mimic, "offset", path, f"{where}: mimic") or 0.0,
     )
 
 

@@ -61,8 +61,8 @@ def of_least_effort(conditions: Conditions, rigid: Callable[[Conditions], Servoe
     best, problems = None, list[SimulationError]()
     for spare in _choices(bare, len(conditions.every)):
         still = _with(conditions, spare, [0.0 * LAWS[0]] * len(spare), whole)
-        servoed = rigid(still)
         try:
+            servoed = rigid(still)
             found = _Search(servoed, demand, followed(servoed, still, t), spare, whole).least()
         except SimulationError as problem:
             problems.append(problem)
@@ -162,7 +162,7 @@ class _Search:
         states = without_internal(self._servoed, Demand(own.t, *rows), self._y)
         if kept:
             self._y = states.y
-        return np.asarray((states.efforts * self._units).ravel())
+        return np.asarray((states.efforts[:, : len(self._units)] * self._units).ravel())
 
     def least(self) -> _Least:
         """As far as Gauss's and Newton's method comes."""

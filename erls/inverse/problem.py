@@ -191,7 +191,7 @@ def _tree(scene: Scene, mechanism: Mechanism, conditions: Conditions) -> SerialF
 
 def _refuse_number(scene: Scene, mechanism: Mechanism, conditions: Conditions, drives: list[str]) -> None:
     wanted, given = len(conditions.every), len(drives)
-    if wanted == given or (wanted < given and not mechanism.loops):
+    if wanted == given or (wanted < given and given <= _motions(scene, mechanism)):
         return
     where, names = f"{scene.path}: servo", ", ".join(each.name for each in conditions.every)
     if wanted > given:
@@ -205,12 +205,20 @@ def _refuse_number(scene: Scene, mechanism: Mechanism, conditions: Conditions, d
         )
     raise SceneError(
         Cause.BAD_FIELD,
-        f"more drives ({', '.join(drives)}) than conditions ({names}) on closed loops",
+        f"more drives ({', '.join(drives)}) than motions that loops leave rigid links: no motion says how they share "
+        "their efforts",
         where=where,
         value=given,
-        limit=wanted,
-        remedy="demand the motion of a joint, too, or name as many drives as conditions (inverse.drives)",
+        limit=_motions(scene, mechanism),
+        remedy="name fewer drives (inverse.drives)",
     )
+
+
+def _motions(scene: Scene, mechanism: Mechanism) -> int:
+    """Of rigid links, what is prescribed as it is."""
+    settings = scene.record.simulation
+    tree = TREES[settings.formulation](with_rigid(mechanism, {link.name for link in mechanism.links}), settings)
+    return tree.size - (len(ClosedChain(tree).kept) if mechanism.loops else 0)
 
 
 def _refuse(scene: Scene, mechanism: Mechanism) -> None:

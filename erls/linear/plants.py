@@ -136,7 +136,7 @@ class ChainPlant:
     def joints(self) -> dict[str, str]:
         """See `Plant`."""
         found = {joint.name: "fixed" if joint.fixed else joint.drive.kind for joint in self.mechanism.joints}
-        own = ((loop.name, loop.freedom) for loop in self.mechanism.loops)
+        own = ((loop.name, loop.freedom) for loop in self.mechanism.loops if loop.coupling is None)
         return {**found, **{name: free.drive.kind for name, free in own if free is not None}}
 
     @cached_property

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from erls.maths.so3 import Array
+from erls.mechanism.couplings import Coupling
 from erls.mechanism.drives import Drive
 from erls.mechanism.joint_types import Freedom, JointType
 from erls.mechanism.joints import JointForces
@@ -79,7 +80,7 @@ class LoopFreedom:
 class Loop:
     """A closing joint: ``outer`` moves against ``inner``, in whose axes its directions are named.
 
-    ``freedom`` is that of one that leaves one motion free.
+    ``freedom`` is that of one that leaves one motion free. A ``coupling`` holds no frames: both ends are the ground.
     """
 
     name: str
@@ -87,6 +88,12 @@ class Loop:
     inner: LoopEnd
     outer: LoopEnd
     freedom: LoopFreedom | None = None
+    coupling: Coupling | None = None
+
+    @property
+    def kind(self) -> str:
+        """What messages call it."""
+        return "loop" if self.coupling is None else "coupling"
 
     @property
     def sticks(self) -> bool:

@@ -73,7 +73,9 @@ def present(mechanism: Mechanism) -> frozenset[str]:
 
 
 def _loop_without(loop: Loop, off: Set[str]) -> Loop:
-    return loop if loop.freedom is None else replace(loop, freedom=_joint_without(loop.freedom, off))
+    if loop.freedom is None or loop.coupling is not None:  # elasticity is all that a coupling consists of
+        return loop
+    return replace(loop, freedom=_joint_without(loop.freedom, off))
 
 
 def _joint_without(joint: _Acting, off: Set[str]) -> _Acting:

@@ -10,9 +10,11 @@ no design within reach holds the constraints. B takes back what the last step ha
 too much along it, so that steps along flat directions do not come short of their end again and again. With H d, the
 change of the slope of the Lagrange function that a step d was to bring, and y what came beyond it,
 
-    B = τ H d dᵀH / (dᵀH d),   τ = dᵀy / (dᵀH d), between -0.8 and 0:
+    B = τ H d dᵀH / (dᵀH d),   τ = dᵀy / (dᵀH d), at least -0.8:
 
-at -1 there would be no curvature left along d; elsewhere H + B stays convex as H is.
+at -1 there would be no curvature left along d; elsewhere H + B stays convex as H is. Where a step goes back on the one
+before and τ > 1/2, designs go to and fro, each swing being τ of the last: there B is kept as well, up to τ = 2, so that
+they end at once. Smaller swings die out by themselves.
 """
 
 from __future__ import annotations
@@ -34,7 +36,7 @@ _MET = 1e-8
 _ACTIVE = 2e-3  # of the limit: rows that may hold a design
 _BOUND = 1e-6  # of the distance of the bounds
 _LEAST = 1e-9  # of the objective's slope: multipliers that are rounding
-_SOFTEST = -0.8  # τ
+_SOFTEST, _SWINGING, _HARDEST = -0.8, 0.5, 2.0  # τ
 _SEEN = 1e-8  # of slopes and steps: differences that tell nothing
 
 
@@ -111,10 +113,14 @@ class Approximation:
         Differentiated.
     bent : (v, v) array, optional
         B.
+    gone : (v,) array, optional
+        The step that led there.
     """
 
-    def __init__(self, rules: Rules, base: Evaluation, bent: Array | None = None) -> None:
-        self.rules, self.base, self.powers = rules, base, Powers(rules, base.x)
+    def __init__(
+        self, rules: Rules, base: Evaluation, bent: Array | None = None, gone: Array | None = None
+    ) -> None:
+        self.rules, self.base, self.powers, self._gone = rules, base, Powers(rules, base.x), gone
         self.bent = np.zeros((len(base.x),) * 2) if bent is None else bent
         self._ones = np.ones(len(base.x))
         rate = self.powers.rate(self._ones)
@@ -225,16 +231,18 @@ class Approximation:
 
     def next(self, found: Evaluation) -> Approximation:
         """About the differentiated design that a step from this one led to, with what the step tells of curvature."""
-        there, plain = Approximation(self.rules, found), Approximation(self.rules, self.base)
-        omega, gone, held = self.powers.to(found.x), found.x - self.base.x, self.held(self.powers.to(found.x))[0]
+        gone = found.x - self.base.x
+        there, plain = Approximation(self.rules, found, gone=gone), Approximation(self.rules, self.base)
+        omega, held = self.powers.to(found.x), self.held(self.powers.to(found.x))[0]
         foreseen = plain.slope(omega, held)
         own = foreseen - plain.slope(self._ones, held)
         curvature = float(own @ gone)
         if curvature <= _SEEN * float(np.linalg.norm(own) * np.linalg.norm(gone)):
             return there
         beyond = float((there.slope(self._ones, held) - foreseen) @ gone)
-        share = min(max(beyond / curvature, _SOFTEST), 0.0)
-        return Approximation(self.rules, found, share / curvature * np.outer(own, own))
+        swings = self._gone is not None and float(own @ self._gone) < 0 and beyond > _SWINGING * curvature
+        share = min(max(beyond / curvature, _SOFTEST), _HARDEST if swings else 0.0)
+        return Approximation(self.rules, found, share / curvature * np.outer(own, own), gone)
 
     def _shares(self, omega: Array, k: int) -> Array:
         return self.rules.shares(self.components(omega))[k]

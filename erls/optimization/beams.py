@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -95,8 +96,10 @@ class Outlines(NamedTuple):
     half: Array
 
 
-def outlines_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, x: Array) -> Outlines:
-    """Of all elements.
+def outlines_of(
+    mechanism: Mechanism, settings: Simulation, links: LinkNumbers, x: Array, wanted: Collection[int]
+) -> Outlines:
+    """Of all elements of some links, by their numbers in the mechanism; others may have sections without a shape.
 
     Raises
     ------
@@ -106,6 +109,7 @@ def outlines_of(mechanism: Mechanism, settings: Simulation, links: LinkNumbers, 
     found = [
         links.kept("outlines", k, x, partial(_outlines, number, description, settings))
         for k, number, description in _described(mechanism, links, x)
+        if number in wanted
     ]
     none = Outlines(np.zeros((0, 3)), np.zeros(0, dtype=bool), np.zeros(0, dtype=np.int64), np.zeros((0, 2)))
     return Outlines(*(np.concatenate(parts) for parts in zip(none, *found, strict=True)))

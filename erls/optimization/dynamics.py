@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from erls.equations.nodal.equations import Nodal
-from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.optimization.design import Design, Designs, Message, run_of, scene_at
@@ -16,7 +15,7 @@ from erls.optimization.equivalent_loads import FrozenLoads, flexible
 from erls.optimization.evaluation import Evaluation, Rules
 from erls.optimization.frozen import Frozen, frozen, nodal_of, node_poses
 from erls.optimization.gradients import derivatives
-from erls.optimization.limits import Bases, Limit, Motion, limit_of
+from erls.optimization.limits import Bases, Limit, Motion, Vibration, limit_of
 from erls.optimization.link_numbers import LinkNumbers
 from erls.optimization.memory import Memory
 from erls.optimization.objective import Objective
@@ -30,21 +29,14 @@ _PLACES = 16  # mechanisms of other lengths that are kept: those beside a design
 
 @dataclass(frozen=True)
 class Place:
-    """What does not depend on sections of beams: elements and frozen configurations of a mechanism."""
+    """What does not depend on sections of beams: elements and frozen configurations of a mechanism; constraints of its
+    shape alone, by number.
+    """
 
     mechanism: Mechanism
     nodal: Nodal
     frozen: Frozen
-
-
-def _no_way_along(constraint: VibrationLimit, variable: str) -> SceneError:
-    """The mechanism would vibrate at other places, by which there is no derivative."""
-    return SceneError(
-        Cause.BAD_FIELD,
-        f"frequencies of the mechanism have no derivative by variable {variable}, which changes lengths or drives",
-        where=f"constraints.{constraint.name}",
-        remedy="take one of them out, or limit frequencies of links",
-    )
+    still: dict[int, Limit] = field(default_factory=dict)
 
 
 class Dynamics:
@@ -82,10 +74,6 @@ class Dynamics:
         self._weighs = any(p.key.split(".")[0] in ("payloads", "joints") for p in problem.parameters) and any(
             isinstance(c, (FrequencyLimit, VibrationLimit)) for c in record.constraints
         )  # payloads and motors on links
-        if self.designs.moving:
-            for constraint in record.constraints:
-                if isinstance(constraint, VibrationLimit):
-                    raise _no_way_along(constraint, self.designs.moving[0])
         self._places: list[Place] = []
         self._ran: ChainRun | None = None
         self.start = self.designs.at(problem.start)
@@ -133,7 +121,9 @@ class Dynamics:
         place = self.place(mechanism)
         given = zip(self.problem.record.constraints, self.at, strict=True)
         about = self.problem, mechanism, place.nodal, place.frozen, self.numbers
-        return [limit_of(c, at, *about, x) for c, at in given]
+        found = [place.still.get(k) or limit_of(c, at, *about, x) for k, (c, at) in enumerate(given)]
+        place.still.update({k: limit for k, limit in enumerate(found) if not limit.of_sections})
+        return found
 
     def motion_of(self, run: ChainRun) -> Motion:
         """A run at all times."""
@@ -197,26 +187,37 @@ class Dynamics:
         def summed(rows: Array) -> Array:
             return rows if weights is None else weights @ rows
 
-        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, weights)
-        each = [self._of_sections(design, motion, k, *one) for k, one in enumerate(zip(limits, bases, strict=True))]
-        whole = whole + summed(np.concatenate(each))
+        whole, self.gradient = derivatives(self.problem, self.designs, design, run, asked, self.times, weights)
+        whole = whole + summed(self._of_sections(design, motion, limits, bases))
         if self.designs.moving or not flexible(self.start.scene):
             return whole, whole
         static = FrozenLoads(self, x, motion, True)
         own = static.differentiate(static.evaluate(x)).jacobians
         return whole, summed(np.concatenate([j.reshape(-1, len(x)) for j in own]))
 
-    def _of_sections(self, design: Design, motion: Motion, k: int, limit: Limit, basis: Bases | None) -> Array:
+    def _of_sections(self, design: Design, motion: Motion, limits: list[Limit], bases: list[Bases | None]) -> Array:
         """(n, v) what variables change of components at the same motion: sections have other sizes."""
-        x, count = design.x, len(design.x)
-        if not limit.of_sections:
-            return np.zeros((limit.exact(motion).size, count))
-        columns = []
+        x, columns = design.x, []
+        still = [None if limit.of_sections else np.zeros(limit.exact(motion).size) for limit in limits]
+        if all(own is not None for own in still):
+            return np.zeros((sum(own.size for own in still if own is not None), len(x)))
         for side, other, step in self.rules.beside(x, _STEP):
-            above, below = (self._beside(design, at)[k].exact(motion, basis).ravel() for at in (side, other))
-            columns.append((above - below) / (2 * step))
+            above, below = (
+                [
+                    one.exact(motion, basis).ravel() if own is None else own
+                    for one, basis, own in zip(self._beside(design, at), bases, still, strict=True)
+                ]
+                for at in (side, other)
+            )
+            columns.append((np.concatenate(above) - np.concatenate(below)) / (2 * step))
         return np.stack(columns, axis=-1)
 
     def _beside(self, design: Design, x: Array) -> list[Limit]:
-        """Constraints at values beside a design, for its motion."""
-        return self._limits(self.designs.at(x).mechanism if self._weighs else design.mechanism, x)
+        """Constraints at values beside a design, for its motion; whole mechanisms vibrate at places of their own."""
+        if self._weighs:
+            return self._limits(self.designs.at(x).mechanism, x)
+        found = self._limits(design.mechanism, x)
+        if self.designs.moving and any(isinstance(limit, Vibration) for limit in found):
+            own = self._limits(self.designs.at(x).mechanism, x)
+            return [at if isinstance(at, Vibration) else limit for limit, at in zip(found, own, strict=True)]
+        return found

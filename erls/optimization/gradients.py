@@ -28,9 +28,15 @@ _STEP = 2e-5  # of a variable: vibrations that fall out of step make large third
 
 
 def derivatives(
-    problem: Problem, designs: Designs, design: Design, run: ChainRun, asked: Asked, weights: Array | None = None
+    problem: Problem,
+    designs: Designs,
+    design: Design,
+    run: ChainRun,
+    asked: Asked,
+    times: Array,
+    weights: Array | None = None,
 ) -> tuple[Array, str]:
-    """(n, v) by all variables, or (m, v) of weighted sums (m, n), and how they were found.
+    """(n, v) of what is asked at times (k,) by all variables, or (m, v) of weighted sums (m, n); how they were found.
 
     Raises
     ------
@@ -44,7 +50,7 @@ def derivatives(
     refused: SceneError | None = None
     for method in _FORWARD if weights is None else _BACKWARD:
         try:  # constraints ask a run for its motion and what moves it; masses are counted from descriptions
-            found = sensitivities(run, {_ALL: asked}, keys, method, weights=sums, models=False)
+            found = sensitivities(run, {_ALL: asked}, keys, method, weights=sums, models=False, times=times)
         except SceneError as refusal:
             if refusal.cause != Cause.NO_DERIVATIVE:
                 raise

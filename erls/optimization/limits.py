@@ -40,7 +40,7 @@ from erls.optimization.records import (
     Term,
     VibrationLimit,
 )
-from erls.optimization.vibrations import held_mechanism
+from erls.optimization.vibrations import HeldMechanism, held_mechanism
 from erls.run.chain.instants import Instants
 from erls.run.chain.run import ChainRun
 from fe_import.files.toml import choose
@@ -197,14 +197,13 @@ class Stress(Limit):
     ) -> None:
         self.name, self.limit, self.at = record.name, record.limit, at
         settings, links = problem.scene.record.simulation, links_of(record, problem.scene)
-        outlines = outlines_of(mechanism, settings, numbers, x)
-        wanted = np.isin(outlines.links, [mechanism.bodies[k] for k in links])
-        self._elements = np.flatnonzero(wanted)
+        wanted = [mechanism.bodies[k] for k in links]
+        outlines = outlines_of(mechanism, settings, numbers, x, wanted)
+        self._elements = np.flatnonzero(np.isin(elements_by_link(mechanism, settings, numbers, x), wanted))
         self.groups = np.tile(np.repeat(np.arange(len(self._elements)), 2), len(at))
-        self._factors = outlines.factors[wanted]
-        self._stiffness = sections_of(mechanism, settings, numbers, x)[wanted]
-        rounds = outlines.rounds[wanted]
-        self.measure: Measure = RoundSection() if rounds.all() else AbsoluteSum()  # which is never below it
+        self._factors = outlines.factors
+        self._stiffness = sections_of(mechanism, settings, numbers, x)[self._elements]
+        self.measure: Measure = RoundSection() if outlines.rounds.all() else AbsoluteSum()  # which is never below it
 
     def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
         """(k e 2, 3)"""
@@ -267,16 +266,15 @@ class Power(Limit):
 
 
 class Frequency(Limit):
-    """(f₀/f)² of links, one row for each; or of the whole mechanism, one row for each time."""
+    """(f₀/f)² of links, one row for each."""
 
     measure: Measure = LargestEigenvalue()
     of_shape, of_sections = True, True
 
-    def __init__(self, record: FrequencyLimit | VibrationLimit, at: IntArray, held: list[HeldLink]) -> None:
+    def __init__(self, record: FrequencyLimit | VibrationLimit, at: IntArray, held: Sequence[HeldLink]) -> None:
         self.name, self.at, self._asked, self._held = record.name, at, record.limit or 1.0, held
         self.limit = None if record.limit is None else 1.0
-        whole = isinstance(record, VibrationLimit)
-        self.groups = np.zeros(len(held), dtype=np.int64) if whole else np.arange(len(held))
+        self.groups = np.arange(len(held))
 
     def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases:
         """Modes of each."""
@@ -295,6 +293,24 @@ class Frequency(Limit):
     def told(self, values: Array) -> Array:
         """[Hz]"""
         return np.asarray(self._asked / np.sqrt(values))
+
+
+class Vibration(Frequency):
+    """The same of the whole mechanism, one row for each time; modes are displacements of all nodes."""
+
+    def __init__(self, record: VibrationLimit, at: IntArray, held: Sequence[HeldMechanism]) -> None:
+        super().__init__(record, at, held)
+        self._mechanisms, self.groups = held, np.zeros(len(held), dtype=np.int64)
+
+    def basis(self, motion: Motion, r: Array | None = None, w: Array | None = None) -> Bases:
+        """Modes of each."""
+        found = super().basis(motion, r, w)
+        return [b._replace(shapes=own.ways @ b.shapes) for own, b in zip(self._mechanisms, found, strict=True)]
+
+    def exact(self, motion: Motion, basis: Bases | None = None) -> Array:
+        """(n, q²), modes of another design brought to what the joints of this one leave free."""
+        pairs = zip(self._mechanisms, basis or self.basis(motion), strict=True)
+        return super().exact(motion, [b._replace(shapes=own.within @ b.shapes) for own, b in pairs])
 
 
 class Buckling(Limit):
@@ -383,7 +399,7 @@ def limit_of(
     if isinstance(record, PowerLimit):
         return Power(record, at, driven_joints(record, problem.scene))
     if isinstance(record, VibrationLimit):
-        return Frequency(record, at, held_mechanism(mechanism, nodal, frozen, numbers, x, at))
+        return Vibration(record, at, held_mechanism(mechanism, nodal, frozen, numbers, x, at))
     held = [held_link(problem, mechanism, numbers, x, k, record.ends) for k in links_of(record, problem.scene)]
     if isinstance(record, FrequencyLimit):
         return Frequency(record, at, held)

@@ -7,6 +7,7 @@ a file holds numbers and names alone, with the SHA-256 of the problem that they 
 from __future__ import annotations
 
 import contextlib
+import copy
 import hashlib
 import json
 import time
@@ -46,11 +47,17 @@ class Memory:
     """
 
     def __init__(self, problem: Problem, path: Path | None = None, resume: bool = False) -> None:
-        self.path, self._key = path, key_of(problem)
+        self.path, self._key, self._label = path, key_of(problem), ""
         self._known: dict[str, Array] = {}
         self._due, self._unwritten = 0.0, False
         if path is not None and resume:
             self._read(path)
+
+    def labelled(self, label: str) -> Memory:
+        """The same file, for designs of an alternative."""
+        found = copy.copy(self)
+        found._label = label
+        return found
 
     def get(self, x: Array, name: str) -> Array | None:
         """What is known of a design under a name."""
@@ -73,9 +80,9 @@ class Memory:
         ended = time.monotonic()
         self._due, self._unwritten = ended + (ended - begun) / _SHARE, False
 
-    @staticmethod
-    def _name(x: Array, name: str) -> str:
-        return hashlib.sha256(np.ascontiguousarray(x, dtype=float).tobytes()).hexdigest()[:32] + "." + name
+    def _name(self, x: Array, name: str) -> str:
+        about = np.ascontiguousarray(x, dtype=float).tobytes() + self._label.encode()
+        return hashlib.sha256(about).hexdigest()[:32] + "." + name
 
     def _write(self, path: Path) -> None:
         with replacing(path) as temporary, temporary.open("wb") as file:
@@ -112,7 +119,7 @@ class Memory:
 def key_of(problem: Problem) -> str:
     """SHA-256 of what designs and their motions depend on, the version with it, limits and settings apart."""
     record = problem.record
-    named = [record.variables, record.constraints]
+    named = [record.variables, record.constraints, *([record.choices] if record.choices else [])]
     about = [package_version("erls"), problem.scene.record, *named]
     digest = hashlib.sha256(msgspec.json.encode(about, order="deterministic"))
     for link in problem.scene.record.links:

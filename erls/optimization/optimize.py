@@ -5,11 +5,13 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from erls.maths.so3 import Array
+from erls.optimization.choices import best_of
 from erls.optimization.confirm import confirmed, simulated
 from erls.optimization.dynamics import Dynamics
 from erls.optimization.memory import Memory
@@ -67,8 +69,24 @@ def optimize(
     ('converged', 0.711)
     """
     loaded = problem if isinstance(problem, Problem) else load_problem(problem, changes)
+    memory = Memory(loaded, state, resume)
+    solved = partial(_solved, tell=tell, progress=progress)
+    if loaded.alternatives:
+        return best_of(loaded, memory, solved, confirm, tell)
+    return solved(loaded, memory, confirm)
+
+
+def _solved(
+    loaded: Problem,
+    memory: Memory,
+    confirm: bool,
+    *,
+    tell: Callable[[str], None],
+    progress: Callable[[str, int, Analysis], None],
+) -> Optimization:
+    """A problem without choices."""
     begun, settings = time.perf_counter(), loaded.record.settings
-    dynamics = Dynamics(loaded, Memory(loaded, state, resume), tell)
+    dynamics = Dynamics(loaded, memory, tell)
     generator = np.random.default_rng(settings.seed)
     others = [_drawn(loaded, generator) for _ in range(settings.starts - 1)]
     found: list[Outcome] = []

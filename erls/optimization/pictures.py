@@ -9,7 +9,7 @@ import numpy as np
 from erls.errors import SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
-from erls.optimization.beams import Outlines, outlines_of
+from erls.optimization.beams import Outlines, elements_by_link, outlines_of
 from erls.optimization.frozen import of_beams
 from erls.optimization.limits import Motion
 from erls.optimization.link_numbers import LinkNumbers
@@ -61,13 +61,13 @@ def drawn(motion: Motion, settings: Simulation, numbers: LinkNumbers, x: Array) 
     assert motion.run is not None
     mechanism, at = motion.run.formulation.mechanism, frames_among(len(motion.frozen.times))
     states = motion.run.series(motion.frozen.times[at])
-    outlines = _outlines(mechanism, settings, numbers, x)
+    owners = elements_by_link(mechanism, settings, numbers, x)
     result = []
     for k in mechanism.bodies:
         link = mechanism.links[k]
-        own = np.flatnonzero(outlines.links == k) if outlines is not None else np.zeros(0, dtype=np.int64)
-        if link.elastic_modes and of_beams(link) and outlines is not None and len(own):
-            result.append(_beams(link.name, motion, at, own, outlines))
+        outlines = _outlines(mechanism, settings, numbers, x, k) if link.elastic_modes and of_beams(link) else None
+        if outlines is not None and len(outlines.links):
+            result.append(_beams(link.name, motion, at, np.flatnonzero(owners == k), outlines))
             continue
         rest = rigid_positions(mechanism, states, k)
         moved = node_positions(mechanism, states, k) - rest
@@ -75,10 +75,12 @@ def drawn(motion: Motion, settings: Simulation, numbers: LinkNumbers, x: Array) 
     return tuple(result)
 
 
-def _outlines(mechanism: Mechanism, settings: Simulation, numbers: LinkNumbers, x: Array) -> Outlines | None:
-    """Of all beams; None where some have constants alone."""
+def _outlines(
+    mechanism: Mechanism, settings: Simulation, numbers: LinkNumbers, x: Array, k: int
+) -> Outlines | None:
+    """Of the beams of a link; None where some have constants alone."""
     try:
-        return outlines_of(mechanism, settings, numbers, x)
+        return outlines_of(mechanism, settings, numbers, x, [k])
     except SceneError:
         return None
 
@@ -89,8 +91,8 @@ def _beams(name: str, motion: Motion, at: IntArray, own: IntArray, outlines: Out
     corners: list[tuple[Array, Array]] = []
     triangles: list[list[int]] = []
     poses, rigid = motion.poses[at], frozen.frames[at][:, frozen.links] @ frozen.local
-    for e in own.tolist():
-        ring = _ring(outlines.half[e], bool(outlines.rounds[e]))
+    for e, half, rounded in zip(own.tolist(), outlines.half, outlines.rounds.tolist(), strict=True):
+        ring = _ring(half, rounded)
         ends = [(frozen.ends[e, side], frozen.sections[e, side]) for side in (0, 1)]
         triangles += _prism(sum(rest.shape[2] for rest, _ in corners), len(ring))
         corners += [(rigid[:, node] @ seat @ ring.T, poses[:, node] @ seat @ ring.T) for node, seat in ends]

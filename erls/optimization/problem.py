@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +12,7 @@ import numpy as np
 from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.mechanism.drives import FreeDrive
+from erls.optimization.combinations import check_choices, combinations
 from erls.optimization.records import (
     DERIVATIVES,
     ENDS,
@@ -72,6 +73,8 @@ class Problem:
         Values of these fields per unit of the variables.
     powers : (v,) array
         Of the variables in approximations.
+    alternatives : tuple of (dict of str to str, Problem)
+        Where there are choices: every combination, by their names, and the problem that it makes. This is the first.
     """
 
     path: Path
@@ -81,6 +84,7 @@ class Problem:
     parameters: tuple[Parameter, ...]
     factors: Array
     powers: Array
+    alternatives: tuple[tuple[dict[str, str], Problem], ...] = ()
 
     @property
     def name(self) -> str:
@@ -139,8 +143,17 @@ def load_problem(path: Path | str, changes: Sequence[str] = ()) -> Problem:
     data = read_toml(path, SceneError)
     for text in changes:
         apply_override(data, text)
+    record = convert(data, ProblemRecord, str(path), SceneError)
+    if not record.choices:
+        return _checked(path, record)
+    check_choices(record, str(path))
+    alternatives = tuple((chosen, _checked(path, own)) for chosen, own in combinations(record))
+    return replace(alternatives[0][1], record=record, alternatives=alternatives)
+
+
+def _checked(path: Path, record: ProblemRecord) -> Problem:
+    """Of a record without choices."""
     file = str(path)
-    record = convert(data, ProblemRecord, file, SceneError)
     scene = self_contained(load_chain(path.parent / record.scene, record.set))
     _check_tables(record, file)
     for k, variable in enumerate(record.variables):

@@ -43,6 +43,22 @@ class Variable(Record, frozen=True):
     power: int | None = None
 
 
+class Choice(Record, frozen=True):
+    """A choice that is no number, such as that of a material: every combination of options is optimized by itself, and
+    the best design is kept.
+
+    Attributes
+    ----------
+    name : str
+        What reports call it.
+    options : dict of str to list of str
+        By their names, changes of the scene, KEY=VALUE as of ``--set``.
+    """
+
+    name: str
+    options: dict[str, list[str]]
+
+
 class Goal(Record, frozen=True):
     """A part of what is minimized.
 
@@ -284,6 +300,8 @@ class ProblemRecord(Record, frozen=True):
         Of the problem; that of the file unless given.
     set : list of str
         Changes of the scene, KEY=VALUE as of ``--set``.
+    choices : list of Choice
+        ``[[choices]]``.
     objective : list of Goal
         ``[[objective]]``, added up; the mass unless given.
     constraints : list of constraints
@@ -298,6 +316,7 @@ class ProblemRecord(Record, frozen=True):
     variables: list[Variable]
     name: str = ""
     set: list[str] = []
+    choices: list[Choice] = []
     objective: list[Goal] = []
     constraints: list[AnyConstraint] = []
     settings: Settings = Settings()

@@ -147,6 +147,14 @@ class Outcome:
 
 
 @dataclass(frozen=True)
+class Tried:
+    """A combination of options, by the names of the choices, and the best that came of it."""
+
+    options: dict[str, str]
+    best: Outcome
+
+
+@dataclass(frozen=True)
 class Optimization:
     """Of all methods.
 
@@ -158,6 +166,10 @@ class Optimization:
     wall_s : float
     begun : Confirmed or None
         The start, simulated in full.
+    tried : tuple of Tried
+        Where there are choices, every combination.
+    chosen : dict of str to str
+        The best of these, whose outcomes these are.
     """
 
     problem: Problem
@@ -165,12 +177,22 @@ class Optimization:
     outcomes: tuple[Outcome, ...]
     wall_s: float
     begun: Confirmed | None = None
+    tried: tuple[Tried, ...] = ()
+    chosen: dict[str, str] = field(default_factory=dict)
 
     @property
     def best(self) -> Outcome:
         """The lightest that holds all constraints, else the one that passes them least."""
+        return min(self.outcomes, key=self._merit)
+
+    @property
+    def merit(self) -> tuple[float, float]:
+        """By which the best of several is the least: what passes limits beyond tolerances, and the objective."""
+        return self._merit(self.best)
+
+    def _merit(self, outcome: Outcome) -> tuple[float, float]:
         tolerance = self.problem.record.settings.violation_tolerance
-        return min(self.outcomes, key=lambda o: (max(0.0, o.violation - tolerance), o.objective))
+        return max(0.0, outcome.violation - tolerance), outcome.objective
 
 
 def summary(found: Optimization) -> dict[str, Any]:
@@ -194,6 +216,11 @@ def summary(found: Optimization) -> dict[str, Any]:
             }
             for name, p in record.published.items()
         },
+        "choices": [
+            {"options": one.options, "method": one.best.method, **_outcome(found.problem, one.best)}
+            for one in found.tried
+        ],
+        "chosen": found.chosen,
         "wall_s": found.wall_s,
     }
 

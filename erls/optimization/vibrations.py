@@ -3,16 +3,20 @@
 Prescribed joints and conditions are rows B u = 0 of displacements u, controllers and springs are stiffness between
 links; what is left vibrates by NᵀK N and NᵀM N, N a basis of what the rows leave free. Nodal elements are those of the
 equivalent static loads (`erls.optimization.frozen`).
+
+Where lengths or motions change from design to design, N does. Modes Φ of all nodes are then brought to what the rows of
+the other design leave free: of an eigenvalue, (M - μ K) Φ = Bᵀ λ, that finds the part (δB Φ)ᵀ λ of its change, too.
 """
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.linalg as la
 
 from erls.equations.nodal.equations import Nodal
+from erls.equations.system import metre_scales
 from erls.maths.saddle import dense
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -22,9 +26,25 @@ from erls.optimization.link_numbers import LinkNumbers
 from fe_import.model import IntArray
 
 
+@dataclass(frozen=True)
+class HeldMechanism(HeldLink):
+    """A mechanism at one time.
+
+    Attributes
+    ----------
+    ways : (n, d) array
+        N.
+    within : (d, n) array
+        Of displacements of all nodes, what is nearest to them, turns counted by their lengths.
+    """
+
+    ways: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    within: Array = field(default_factory=lambda: np.zeros((0, 0)))
+
+
 def held_mechanism(
     mechanism: Mechanism, nodal: Nodal, frozen: Frozen, numbers: LinkNumbers, x: Array, at: IntArray
-) -> list[HeldLink]:
+) -> list[HeldMechanism]:
     """What vibrates at some of the times, as a link between its ends.
 
     Parameters
@@ -52,6 +72,15 @@ def held_mechanism(
         t, q = float(frozen.times[k]), system.at(frozen.frames[k, frozen.links] @ frozen.local)
         stiffness = dense(system.stiffness_and_damping(t, q, rest, rest, none)[0])
         mass = dense(system.mass_matrix(t, q))
-        free = la.null_space(dense(system.constraint_matrix(t, q)))
-        result.append(HeldLink(*((within + within.T) / 2 for within in (free.T @ m @ free for m in (stiffness, mass)))))
+        ways, within = _free(dense(system.constraint_matrix(t, q)), metre_scales(system))
+        held, weight = ((part + part.T) / 2 for part in (ways.T @ matrix @ ways for matrix in (stiffness, mass)))
+        result.append(HeldMechanism(held, weight, ways=ways, within=within))
     return result
+
+
+def _free(rows: Array, metres: Array) -> tuple[Array, Array]:
+    """N and its inverse from displacements nearest to it: with turns in metres, and rows that weigh the same."""
+    scaled = rows / metres
+    sizes = np.linalg.norm(scaled, axis=1, keepdims=True)
+    free = la.null_space(scaled / np.where(sizes > 0, sizes, 1.0))
+    return free / metres[:, None], free.T * metres

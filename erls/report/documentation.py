@@ -4,7 +4,7 @@ A page holds a table between two marks, ``<!-- table: NAME -->`` and ``<!-- end 
 
     python -m erls.report.documentation docs
 
-makes all of them anew. A new table is one function here and one line in `TABLES`.
+makes all of them anew, and numbers equations. A new table is one function here and one line in `TABLES`.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 from erls.mechanism.effects import EFFECTS, LINEAR
+from erls.report.equation_numbers import numbered
 from erls.report.fields import field_tables
 from erls.scene.integrators import INTEGRATORS
 from fe_import.exports import EXPORTS
@@ -23,9 +24,9 @@ _MARKS = re.compile(r"(<!-- table: (.+?) -->\n).*?(<!-- end of table -->)", re.D
 
 
 def written(page: str) -> str:
-    """A page with its tables made anew."""
+    """A page with its tables made, and its equations numbered, anew."""
     made = tables()
-    return _MARKS.sub(lambda found: f"{found[1]}\n{made[found[2]]}\n\n{found[3]}", page)
+    return numbered(_MARKS.sub(lambda found: f"{found[1]}\n{made[found[2]]}\n\n{found[3]}", page))
 
 
 def tables() -> dict[str, str]:

@@ -18,6 +18,7 @@ from erls.run.file import EARLIER, load_run
 from erls.run.file import SCHEMA as RUN_SCHEMA
 from erls.scene.bodies.schema import BodyScene
 from erls.scene.chain import Scene
+from erls.scene.couplings import Coupling
 from erls.scene.joints import Acting, Joint
 from erls.scene.read import load_scene
 from fe_import.description.link import LinkFile, load_link
@@ -113,6 +114,13 @@ def _drives(joint: Joint) -> str:
     return ", ".join(f"{name} {msgspec.to_builtins(each.drive)['type']}".strip() for name, each in acting.items())
 
 
+def _follows(coupling: Coupling) -> str:
+    """What a coupling says, and how it gives way."""
+    followed = " + ".join(f"{ratio:g} {name}" for name, ratio in coupling.follows.items())
+    kind = ("play" if coupling.stops else "elastic") if coupling.elastic else "ideal"
+    return f"{coupling.joint} = {followed.replace('+ -', '- ')}, {kind}"
+
+
 def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
     record = scene.record
     rows = [
@@ -136,6 +144,8 @@ def _scene_info(scene: Scene) -> tuple[dict[str, Any], str]:
             for x, kind in zip(record.loops, driven, strict=True)
         )
         text += "\nloops: " + ", ".join(joined)
+    if record.couplings:
+        text += "\ncouplings: " + ", ".join(f"{c.name} ({_follows(c)})" for c in record.couplings)
     text += "\nsimulation: " + ", ".join(f"{k} = {v}" for k, v in simulation.items() if v is not None)
     return {"file": "scene", "scene": scene.name, **msgspec.to_builtins(record)}, text
 

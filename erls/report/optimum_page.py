@@ -19,7 +19,10 @@ _SHOWN = 12  # active constraints
 
 def optimum_text(found: Optimization) -> str:
     """What came out, beside what is published."""
-    parts = [_about(found), table(_header(found), _rows(found))]
+    parts = [_about(found)]
+    if found.tried:
+        parts.append("Choices\n" + table(_tried_header(found), _tried_rows(found)))
+    parts.append(table(_header(found), _rows(found)))
     if any(o.confirmed for o in found.outcomes):
         parts.append(f"{_AGAIN}\n" + table(_confirmed_header(found), _confirmed_rows(found)))
     for o in found.outcomes:
@@ -36,6 +39,8 @@ def optimum_page(found: Optimization) -> str:
     parts = [paragraph(_about(found))]
     for o in found.outcomes:
         parts.append(paragraph(f"{o.method}: {_reason(o)}", "good" if o.status == "converged" else "bad"))
+    if found.tried:
+        parts += [heading("Choices"), html_table(_tried_header(found), _tried_rows(found))]
     parts += [heading("Designs"), html_table(_header(found), _rows(found))]
     parts += [heading(_AGAIN), html_table(_confirmed_header(found), _confirmed_rows(found))]
     parts += [figure(plot) for plot in _motions(found)]
@@ -53,6 +58,19 @@ def _about(found: Optimization) -> str:
     names = [o.method for o in found.outcomes]
     sizes = f"{len(found.problem.names)} variables, scene {found.problem.scene.name}"
     return f"{found.problem.name}: {sizes}, {', '.join(names)}"
+
+
+def _tried_header(found: Optimization) -> tuple[str, ...]:
+    return *found.chosen, "objective", *found.problem.names, "violation", "analyses", "by", "status", ""
+
+
+def _tried_rows(found: Optimization) -> Rows:
+    """The best of each combination."""
+    rows: Rows = []
+    for options, o in ((one.options, one.best) for one in found.tried):
+        about = _share(o.violation), str(o.analyses), o.method, o.status, "chosen" if options == found.chosen else ""
+        rows.append((*options.values(), _number(o.objective), *_numbers(o.x.tolist()), *about))
+    return rows
 
 
 def _reason(o: Outcome) -> str:

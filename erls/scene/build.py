@@ -22,6 +22,7 @@ from erls.mechanism.place import Place
 from erls.mechanism.thermal import at_temperature, unwarmed
 from erls.mechanism.without_effects import without
 from erls.scene.build_contacts import build_contacts
+from erls.scene.build_couplings import build_couplings
 from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loads import build_loads
 from erls.scene.build_loops import build_loops
@@ -126,7 +127,8 @@ def build_mechanism(
         bandwidth=record.simulation.bandwidth,
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
-    chain = without(replace(chain, loops=build_loops(scene, chain), effects=effects), ALL - effects)
+    closing = build_loops(scene, chain) + build_couplings(scene)
+    chain = without(replace(chain, loops=closing, effects=effects), ALL - effects)
     return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
 
 

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from erls.mechanism.profiles import Load as Profile
 from erls.mechanism.sensors.registry import AnySensor
 from erls.scene.contacts import Contact
+from erls.scene.couplings import Coupling
 from erls.scene.joints import Joint, Loop
 from erls.scene.links import Link
 from erls.scene.plan import Plan
@@ -178,6 +179,8 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
         How links start.
     loops : list of Loop
         Joints that close the chain, ``[[loops]]``.
+    couplings : list of Coupling
+        Joints that follow others by ratios, ``[[couplings]]``.
     events : list of Event
         Crossings that are told after the run, or end it, ``[[events]]``.
     sensors : list of AnySensor
@@ -200,6 +203,7 @@ class SceneRecord(SceneTables, frozen=True, kw_only=True):
     contacts: list[Contact] = []
     initial: Initial = Initial()
     loops: list[Loop] = []
+    couplings: list[Coupling] = []
     events: list[Event] = []
     sensors: list[AnySensor] = []
     servo: list[Servo] = []

@@ -8,6 +8,7 @@ from erls.mechanism.drives import MotionDrive
 from erls.mechanism.joint_types import CHAIN_TYPES, HOLDING_TYPES, JOINT_TYPES, SINGLE_TYPES
 from erls.scene.build_joints import GROUND, joint_coordinates
 from erls.scene.chain import Event, Load, SceneRecord
+from erls.scene.check_couplings import check_couplings
 from erls.scene.check_sensors import check_sensors
 from erls.scene.check_servo import check_plan, check_servo
 from erls.scene.check_settings import check_settings
@@ -57,7 +58,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         counts = f"{len(scene.links)} links, {len(scene.joints)} joints"
         message = "joint k carries link k, so there must be as many links as joints"
         raise bad(f"{file}: links", message, counts, "add or remove one")
-    for kind in ("joints", "links", "points", "contacts", "loops", "events"):
+    for kind in ("joints", "links", "points", "contacts", "loops", "couplings", "events"):
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
         check_names(named)
     for k, joint in enumerate(scene.joints):
@@ -83,6 +84,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         _check_loop(loop, scene, f"{file}: loops[{k}]")
     for k, event in enumerate(scene.events):
         _check_event(event, scene, f"{file}: events[{k}]")
+    check_couplings(scene, file)
     _check_sensors(scene, file)
     check_servo(scene, file)
     check_plan(scene, file)
@@ -90,7 +92,7 @@ def check_scene(scene: SceneRecord, file: str) -> None:
         _check_bandwidth(scene, f"{file}: simulation.bandwidth")
     _check_compound(scene, f"{file}: simulation")
     check_sticking(scene, file)
-    if scene.loops:
+    if scene.loops or scene.couplings:
         if scene.simulation.coordinates != "independent":
             message, right = "loops tie independent coordinates", "remove it, or the loops"
             raise bad(f"{file}: simulation.coordinates", message, scene.simulation.coordinates, right)
@@ -107,6 +109,7 @@ def _check_sensors(scene: SceneRecord, file: str) -> None:
     moving = [name for joint in scene.joints for name in joint_coordinates(joint)]
     moving += [loop.name for loop in scene.loops if JOINT_TYPES[loop.type].one is not None]
     taken = {*points, *(joint.name for joint in scene.joints), *(loop.name for loop in scene.loops), "t", "energy"}
+    taken |= {coupling.name for coupling in scene.couplings}
     check_sensors(scene.sensors, file, {"point": points, "joint": moving}, taken)
 
 
@@ -165,7 +168,7 @@ def _check_contact(contact: Contact, scene: SceneRecord, place: str) -> None:
 
 def _check_feed_forward(acting: Acting, place: str) -> None:
     if getattr(acting.drive, "feed_forward", False) is True:
-        message = "the inverse dynamics of the tree does not know its loops"
+        message = "the inverse dynamics of the tree does not know its loops and couplings"
         raise bad(f"{place}.drive.feed_forward", message, True, "set it to false or 'elastic'")
 
 
@@ -292,6 +295,7 @@ def _check_bandwidth(scene: SceneRecord, place: str) -> None:
     s = scene.simulation
     for found, what in (
         (bool(scene.loops), "loops"),
+        (bool(scene.couplings), "couplings"),
         (any(link.substructures > 1 and link.flexible for link in scene.links), "substructures"),
         (s.formulation == "nodal", "formulation = 'nodal'"),
         (s.coordinates == "absolute", "coordinates = 'absolute'"),

@@ -21,12 +21,15 @@ from erls.sensitivity.nodal_motion import Motion, ratios_of, rule_of, walks_of
 from erls.sensitivity.nodal_start import LegStart, shares_of, start_changes
 from erls.sensitivity.outputs import ALONG
 from erls.sensitivity.variants import Difference
+from fe_import.model import IntArray
 
 _ROOM = 4_000_000
 """Numbers of slopes of forces that are held at a time."""
 
 
-def differentiated(run: ChainRun, differences: Sequence[Difference]) -> Array:
+def differentiated(
+    run: ChainRun, differences: Sequence[Difference], rows: IntArray | slice = slice(None)
+) -> Array:
     """(k, 3, N, p) derivatives of what a nodal run keeps of its knots, with rates and accelerations, by p parameters.
 
     Parameters
@@ -34,6 +37,8 @@ def differentiated(run: ChainRun, differences: Sequence[Difference]) -> Array:
     run : ChainRun
         Of the formulation ``nodal``.
     differences : sequence of Difference
+    rows : array or slice, optional
+        Numbers of the knots.
 
     Raises
     ------
@@ -43,7 +48,7 @@ def differentiated(run: ChainRun, differences: Sequence[Difference]) -> Array:
     motion = Motion(run)
     changes = changes_of(run, differences, motion)
     n = motion.system.size
-    found = [_kept(motion, difference, changes[:, p], n) for p, difference in enumerate(differences)]
+    found = [_kept(motion, difference, changes[:, p], n, rows) for p, difference in enumerate(differences)]
     return np.stack(found, axis=3)
 
 
@@ -106,23 +111,25 @@ def singular(t: float) -> SimulationError:
     )
 
 
-def _kept(motion: Motion, difference: Difference, change: Array, n: int) -> Array:
-    """(k, 3, N) what changes (k, 3 n + m) of the nodes are of what a run keeps, as differences along them."""
+def _kept(motion: Motion, difference: Difference, change: Array, n: int, rows: IntArray | slice) -> Array:
+    """(k, 3, N) what changes (knots, 3 n + m) of the nodes are of what a run keeps of some knots, as differences along
+    them.
+    """
     from erls.sensitivity.nodal_kernels import stored  # here: it is compiled
 
     system = motion.system
-    place, rate, gain = (change[:, i * n : (i + 1) * n] for i in range(3))
+    place, rate, gain = (np.ascontiguousarray(change[rows, i * n : (i + 1) * n]) for i in range(3))
+    q, v, a = motion.q[rows], motion.v[rows], motion.a[rows, :n]
     size = 12 * system.count + len(system.model.actuators)
     flat, scratch = system.flat, system.flat.scratch.copy()
-    count = len(change)
+    count = len(place)
 
     def at(reals: Array, share: Array) -> Array:
         out, along = np.empty((count, 3, size)), share[:, None]
-        moved = motion.v + along * rate, motion.a[:, :n] + along * gain
-        stored(reals, flat.integers, scratch, motion.q, along * place, *moved, out)
+        stored(reals, flat.integers, scratch, q, along * place, v + along * rate, a + along * gain, out)
         return out
 
-    step = shares_of(system, place, (motion.v, rate), (motion.a[:, :n], gain))
+    step = shares_of(system, place, (v, rate), (a, gain))
     frames = np.asarray(sum((weight / step)[:, None, None] * at(flat.reals, far * step) for far, weight in ALONG))
     models = [variant.formulation.system for variant in difference.variants]
     if not all(np.array_equal(own.model.actuator_frames, models[0].model.actuator_frames) for own in models):
@@ -133,4 +140,4 @@ def _kept(motion: Motion, difference: Difference, change: Array, n: int) -> Arra
     found = [change[:, 2 * n :]]
     for _ in range(2):
         found.append(slopes_in_time(motion.t, found[-1]))
-    return np.concatenate([frames, np.stack(found, axis=1)], axis=2)
+    return np.concatenate([frames, np.stack([one[rows] for one in found], axis=1)], axis=2)

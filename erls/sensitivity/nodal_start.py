@@ -187,7 +187,11 @@ class _Resting:
 
     def _balance(self, variant: Variant) -> Array:
         formulation: Any = variant.formulation
-        held, q, rest = formulation.held, self._q, np.zeros(self._held.size)
+        q, rest = self._q, np.zeros(self._held.size)
+        if variant.sections:  # conditions and multipliers are those of the run: no joints to be held anew
+            force = formulation.system.residual(0.0, q, rest, rest)
+            return np.concatenate([force, np.zeros(self._held.constraints)])
+        held = formulation.held
         if held.rows.names != self._held.rows.names:
             message = "which conditions of a loop follow from the others at rest depends on a parameter"
             raise SceneError(Cause.BAD_FIELD, message, where="initial.deformation", remedy="start undeformed")

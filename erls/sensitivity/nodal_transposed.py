@@ -21,12 +21,14 @@ from erls.equations.nodal.contract import (
 )
 from erls.equations.nodal.matrix import factored
 from erls.equations.nodal.tangents import EXACT, Exact, exact_blocks
+from erls.maths import fronts
 from erls.maths.band_transposed import solve_transposed
 from erls.maths.coefficients import stumpff, tangent_coefficients
 from erls.maths.jit import ENABLED, kernel, part
 from erls.maths.motions import series_transposed, transposed
 from erls.maths.rotations import exponential, value
 from erls.maths.vectors import dot, put, three
+from erls.maths.views import matrix_at
 from erls.sensitivity.nodal_kernels import (
     ACCELERATION,
     ALGORITHMIC,
@@ -63,11 +65,14 @@ if ENABLED:
 def _solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     """`erls.equations.nodal.matrix.solve` with the transpose."""
     own = read_layout(reals, integers, integers[len(integers) - 1])
-    order = read_model(reals, integers, own.model).order
-    room = read_factors(factors, integers, own.factors)
+    model, room = read_model(reals, integers, own.model), read_factors(factors, integers, own.factors)
+    order = model.order
     for i in range(len(order)):
         room.ordered[i] = room.right[order[i]] * b[order[i]]
-    solve_transposed(room.band, room.pivots, room.ordered)
+    if model.band < 0:
+        fronts.solve_transposed(room.entries, model.fronts, model.later, room.pivots, room.ordered)
+    else:
+        solve_transposed(matrix_at(room.entries, 0, len(order), 3 * model.band + 1), room.pivots, room.ordered)
     for i in range(len(order)):
         b[order[i]] = room.left[order[i]] * room.ordered[i]
 

@@ -10,7 +10,7 @@ that of the run with the mechanism at other values.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -20,6 +20,7 @@ from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 from erls.sensitivity.variants import Difference
+from fe_import.model import IntArray
 
 Output = Callable[[ChainRun], Any]
 """A number or an array that a run gives, smooth in its motion."""
@@ -50,6 +51,31 @@ def value_of(output: Output, run: ChainRun, name: str) -> Array:
         message, remedy = "not finite", "only finite outputs have derivatives"
         raise SceneError(Cause.BAD_FIELD, message, where=f"output {name}", remedy=remedy)
     return found
+
+
+def around(run: ChainRun, times: Array, outputs: Mapping[str, Output], values: Mapping[str, Array]) -> IntArray:
+    """Numbers of the knots between which times (k,) lie, all that outputs of these ``values`` ask for.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: an output looks elsewhere, too.
+    """
+    t = run.solution.t
+    sides = [np.searchsorted(t, times, side=side) + more for side in ("left", "right") for more in (-1, 0)]
+    ends = np.array([0, len(t) - 3, len(t) - 2, len(t) - 1])
+    rows = np.unique(np.clip(np.concatenate([*sides, ends]), 0, len(t) - 1))
+    for name, output in outputs.items():
+        if not np.array_equal(value_of(output, at_knots(run, rows), name), values[name]):
+            message, remedy = "it looks at other times than those that are given", "give all, or none"
+            raise SceneError(Cause.BAD_FIELD, message, where=f"output {name}", remedy=remedy)
+    return rows
+
+
+def at_knots(run: ChainRun, rows: IntArray) -> ChainRun:
+    """A run that knows some of its knots alone."""
+    s = run.solution
+    return replace(run, solution=replace(s, t=s.t[rows], y=s.y[rows], v=s.v[rows], a=s.a[rows]))
 
 
 def own_derivative(output: Output, name: str, run: ChainRun, difference: Difference, value: Array) -> Array:

@@ -27,13 +27,14 @@ from erls.sensitivity import forward
 from erls.sensitivity.adjoint import gradients
 from erls.sensitivity.gradients import Asking
 from erls.sensitivity.nodal_motion import metres_of
-from erls.sensitivity.outputs import EVALUATIONS, Output, derivative_of, own_derivative, value_of
+from erls.sensitivity.outputs import EVALUATIONS, Output, around, at_knots, derivative_of, own_derivative, value_of
 from erls.sensitivity.parameters import Parameter, parameters_of
 from erls.sensitivity.schemes import Scheme, generalized_alpha, lobatto
 from erls.sensitivity.variants import Difference, differences
 from erls.simulation.simulate import simulate
 from fe_import.files.log import log
 from fe_import.files.toml import choose
+from fe_import.model import IntArray
 
 _Differ = Callable[[Sequence[Parameter]], list[Difference]]
 
@@ -85,6 +86,7 @@ def sensitivities(
     *,
     weights: Mapping[str, Array] | None = None,
     models: bool = True,
+    times: Array | None = None,
     tell: Callable[[str], None] = log,
 ) -> Sensitivities:
     """Differentiate what a run gives by numbers of its scene.
@@ -112,6 +114,8 @@ def sensitivities(
     models : bool, optional
         Whether outputs of a nodal run may ask for numbers of modal models, such as masses of links. Without that a link
         of another section needs no reduction: nodal elements take nothing but nodes and interfaces from models.
+    times : (k,) array, optional
+        All at which outputs look at the run [s]: the forward method then leaves out what is between.
     tell : callable, optional
         Told about each preparation that takes time.
 
@@ -159,7 +163,8 @@ def sensitivities(
         askings = _askings(run, outputs, values, sums, len(keys), method)
         differ = partial(differences, run, models=models)
         if askings is None:
-            made = _forward(run, outputs, values, sums, keys, differ)
+            rows = None if times is None else around(run, times, outputs, values)
+            made = _forward(run, outputs, values, sums, keys, differ, rows)
         else:
             made = _adjoint(askings, keys, differ)
     at = {one.key: one.value for one in keys}
@@ -222,15 +227,17 @@ def _forward(
     sums: Mapping[str, Array],
     keys: Sequence[Parameter],
     differ: _Differ,
+    rows: IntArray | None,
 ) -> dict[str, dict[str, Array]]:
     derivatives: dict[str, dict[str, Array]] = {name: {} for name in outputs}
+    seen = run if rows is None else at_knots(run, rows)
     some = max(1, _ROOM // max(1, 3 * run.solution.y.size))
     for first in range(0, len(keys), some):
         found = differ(keys[first : first + some])
-        motion, metres = _motion(run, found)
+        motion, metres = _motion(run, found, slice(None) if rows is None else rows)
         for k, one in enumerate(found):
             for name, output in outputs.items():
-                derivative = derivative_of(output, name, run, one, motion[..., k], metres, values[name])
+                derivative = derivative_of(output, name, seen, one, motion[..., k], metres, values[name])
                 if name in sums:
                     derivative = sums[name] @ derivative.ravel()
                 derivatives[name][one.parameter.key] = derivative
@@ -269,21 +276,21 @@ def _of_nodes(run: ChainRun) -> bool:
     return system_of(run.formulation.mechanism, run.scene.record.simulation) == "nodal"
 
 
-def _motion(run: ChainRun, differences: Sequence[Difference]) -> tuple[Array, Array]:
-    """(k, 3, n, p) derivatives of what a run keeps of its knots, with rates and accelerations, and (n,) metres per unit
-    of it.
+def _motion(run: ChainRun, differences: Sequence[Difference], rows: IntArray | slice) -> tuple[Array, Array]:
+    """(k, 3, n, p) derivatives of what a run keeps of some of its knots, with rates and accelerations, and (n,) metres
+    per unit of it.
     """
     formulation: Any = run.formulation
     if _of_nodes(run):
         from erls.sensitivity import nodal_forward  # here: most runs need none of it
 
-        return nodal_forward.differentiated(run, differences), metres_of(formulation)
+        return nodal_forward.differentiated(run, differences, rows), metres_of(formulation)
     metres = metre_scales(formulation)
     if _eventful(run):
         from erls.sensitivity import eventful  # here: most runs need none of it
 
-        return eventful.differentiated(run, differences, scheme_of(run)), metres
-    return forward.differentiated(run, differences, scheme_of(run)), metres
+        return eventful.differentiated(run, differences, scheme_of(run))[rows], metres
+    return forward.differentiated(run, differences, scheme_of(run))[rows], metres
 
 
 def _eventful(run: ChainRun) -> bool:

@@ -42,12 +42,15 @@ class Variant:
     formulation : Formulation
     turn : (n, n) array or None
         T, of all coordinates; None where they are the same.
+    sections : bool
+        Whether it differs in what nodal beams are made of alone: joints and their conditions are those of the run.
     """
 
     weight: float
     apart: float
     formulation: Any
     turn: Array | None = None
+    sections: bool = False
 
     def placed(self, y: Array) -> Array:
         """(..., n) coordinates of the run in those of the variant."""
@@ -179,7 +182,7 @@ def _variants(
                 value=parameter.value,
                 remedy="name another field, or smooth the profile that it belongs to",
             )
-        result.append(Variant(weight / step, at * step, formulation, turn))
+        result.append(Variant(weight / step, at * step, formulation, turn, sections))
     return result
 
 

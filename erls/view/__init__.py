@@ -39,6 +39,7 @@ def picture(
     times: Sequence[float] | None = None,
     magnification: float = 1.0,
     size: Size = (1280, 800),
+    stress: bool = False,
 ) -> None:
     """Draw a run: the mechanism at several times, the last one solid, with the paths of its points.
 
@@ -53,6 +54,8 @@ def picture(
         Of the displacement against the Equivalent Rigid Link System, at rest against where all is built; 1 is true.
     size : (width, height)
         [pixel]
+    stress : bool
+        Colours say von Mises stress, of shells the largest over the thickness, rather than deflection.
 
     Raises
     ------
@@ -63,7 +66,7 @@ def picture(
     """
     check(magnification, size, path, PICTURES)
     with replacing(path) as temporary:
-        image = _picture(run, times, magnification, size)
+        image = _picture(run, times, magnification, size, stress)
         if temporary.suffix.lower() == ".png":
             image.save(temporary, optimize=True, pnginfo=_remark())
         else:
@@ -78,8 +81,8 @@ def _remark() -> PngInfo:
     return remark
 
 
-def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size) -> Image:
-    figure = figure_of(run, magnification)
+def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size, stress: bool) -> Image:
+    figure = figure_of(run, magnification, stress)
     poses = figure.poses(run.spread(_INSTANTS) if times is None or not len(times) else times)
     motion = surveyed(figure, magnification, poses)
     *earlier, last = poses
@@ -103,7 +106,7 @@ def _picture(run: Run, times: Sequence[float] | None, magnification: float, size
     return sheet.image
 
 
-def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800)) -> None:
+def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800), stress: bool = False) -> None:
     """Open a window that can be turned, with a slider for time; returns when it is closed.
 
     Raises
@@ -114,7 +117,7 @@ def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800)) -> None
     check(magnification, size)
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise no_picture("there is no display for a window")
-    figure = figure_of(run, magnification)
+    figure = figure_of(run, magnification, stress)
     motion = surveyed(figure, magnification, None)
     with drawing(), Window(figure, motion, magnification, size) as window:
         if window.hidden:
@@ -147,6 +150,7 @@ def write_view(
     speed: float = 1.0,
     progress: Progress | None = None,
     repeat: Sequence[str] = (),
+    stress: bool = False,
 ) -> None:
     """Write a picture (.png, .jpg), film (.mp4, .gif), report (.html), export for ParaView (.pvd) or table (.csv).
 
@@ -165,6 +169,9 @@ def write_view(
         Told how much is done, and the total.
     repeat : sequence of str
         Words of the command that made the run, for a report.
+    stress : bool
+        Colours of pictures and films say von Mises stress, of shells the largest over the thickness, rather than
+        deflection; an export has it beside. Not for tables and reports.
 
     Raises
     ------
@@ -178,11 +185,14 @@ def write_view(
     if suffix in FILMS:
         if times is not None and len(times):
             raise bad("times", "a film shows the whole run", list(times), None, "leave the times out, or make a .png")
-        film(run, path, magnification, fps, speed, progress=progress)
+        film(run, path, magnification, fps, speed, progress=progress, stress=stress)
     elif suffix in PICTURES:
-        picture(run, path, times, magnification)
+        picture(run, path, times, magnification, stress=stress)
     elif suffix == ".pvd":
-        export_paraview(run, path, times, magnification, progress)
+        export_paraview(run, path, times, magnification, progress, stress)
+    elif stress:
+        remedy = "make a picture (.png, .jpg), a film (.mp4, .gif) or an export (.pvd)"
+        raise bad("stress", "tables and reports do not show it", suffix, None, remedy)
     elif magnification != 1.0:
         what = "a table holds" if suffix == ".csv" else "a report has a slider for it and shows"
         raise bad("magnification", f"{what} true values", magnification, None, "leave it at 1")
@@ -194,5 +204,3 @@ def write_view(
             temporary.write_text(text, encoding="utf-8")
     else:
         export_csv(run, path, times)
-
-

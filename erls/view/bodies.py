@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.nodal.joints import GROUND, Joint
+from erls.equations.nodal.shell_stress import SurfaceStress
 from erls.maths import motion_maps as motions
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
@@ -21,8 +22,9 @@ from erls.run.bodies.run import BodyRun
 from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Body, LineSpring
 from erls.view.body_shapes import body_surface, ellipsoid, facing, spring_surface
-from erls.view.figure import Figure, Part, PartMesh, Pose
-from erls.view.shapes import JointPlace, ground_surface, joints_surface, part_surface, polylines
+from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
+from erls.view.shapes import JointPlace, ground_surface, joints_surface, part_surface, polylines, thick
+from erls.view.stress import largest, surface_stress
 from fe_import.model import IntArray
 from fe_import.models.inertia import inertia_matrix
 
@@ -34,7 +36,13 @@ class BodyFigure(Figure):
     """A run of bodies and beams."""
 
     run: BodyRun
+    shade: Shade = DEFLECTION
     part = "part"
+
+    @cached_property
+    def stress(self) -> list[SurfaceStress]:
+        """Where to look for that of each shell."""
+        return surface_stress(self.run)
 
     @property
     def gravity(self) -> Array:
@@ -170,6 +178,16 @@ class BodyPose(Pose):
         built = BodyPose(self.figure, 0.0, self.figure.built, self.bent).nodes(0.0)
         return [np.linalg.norm(a - b, axis=1) for a, b in zip(here, built, strict=True)]
 
+    def values(self) -> list[Array]:
+        """(p,) of each beam, then of each shell, then of each body."""
+        if self.figure.shade is DEFLECTION:
+            return super().values()
+        beams, places = len(self.figure.run.assembly.beams), self.nodes(1.0)
+        stress = [largest(own.at(self.poses)) for own in self.figure.stress]
+        found = [np.full(len(each), np.nan) for each in places]
+        found[beams : beams + len(stress)] = stress
+        return found
+
     def anchor(self) -> Array:
         """(3,) the last node."""
         return np.asarray(self.poses[-1, :3, 3])
@@ -177,13 +195,15 @@ class BodyPose(Pose):
     def parts(self, magnification: float, unit: float) -> list[Part]:
         """Beams, then shells, bodies and springs."""
         record, found, none = self.figure.run.scene.record, [], np.zeros((0, 3), dtype=np.int64)
-        moved = [1e3 * lengths for lengths in self.deflections()]
+        moved = self.values()
         for line, values in zip(self._lines(magnification), moved, strict=False):
             found.append(Part(part_surface(line, none, [list(range(len(line)))], 0, values, unit)))
         surfaces = self.figure.run.assembly.shells.values()
         for surface, places in zip(surfaces, self._surfaces(magnification), strict=True):
             triangles = surface.cells[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
-            found.append(Part(part_surface(places, triangles, [], 0, moved[len(found)], unit)))
+            heights = np.tile(surface.heights, (len(places), 1))
+            places, triangles, values = thick(places, triangles, heights, moved[len(found)])
+            found.append(Part(part_surface(places, triangles, [], 0, values, unit)))
         for k, (body, values) in enumerate(zip(record.bodies, moved[len(found) :], strict=True)):
             found.append(_coloured(self._body(k, body, magnification, unit), float(values[-1])))
         for spring in record.springs:
@@ -218,9 +238,10 @@ class BodyPose(Pose):
             nodes = [own[0].nodes[0], *(e.nodes[1] for e in own)]
             cells = [("line", np.stack([np.arange(len(own)), np.arange(1, len(own) + 1)], axis=1))]
             found.append(PartMesh(name, shown[nodes], cells, (true - built)[nodes]))
-        for name, surface in assembly.shells.items():
-            at = surface.nodes
-            found.append(PartMesh(name, shown[at], [("quad", surface.cells)], (true - built)[at]))
+        stress = [] if self.figure.shade is DEFLECTION else [largest(own.at(self.poses)) for own in self.figure.stress]
+        for k, (name, surface) in enumerate(assembly.shells.items()):
+            at, more = surface.nodes, {"von_mises_MPa": stress[k]} if stress else {}
+            found.append(PartMesh(name, shown[at], [("quad", surface.cells)], (true - built)[at], more))
         for body in self.figure.run.scene.record.bodies:
             node = [assembly.numbers[body.name]]
             found.append(PartMesh(body.name, shown[node], [("vertex", np.array([[0]]))], (true - built)[node]))

@@ -18,8 +18,9 @@ from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
 from erls.run.chain.places import node_positions, rigid_frames, rigid_positions
 from erls.run.chain.run import ChainRun
-from erls.view.figure import Figure, Part, PartMesh, Pose
-from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines
+from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
+from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines, thick
+from erls.view.stress import chain_stress
 
 
 @dataclass(frozen=True)
@@ -27,6 +28,7 @@ class ChainFigure(Figure):
     """A run of a chain."""
 
     run: ChainRun
+    shade: Shade = DEFLECTION
     part = "link"
 
     @property
@@ -55,8 +57,12 @@ class ChainFigure(Figure):
 
     def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:
         """The chain at each time."""
-        mechanism = self.run.formulation.mechanism
-        return [ChainPose(state.time, mechanism, state) for state in self.run.states(list(times))]
+        mechanism, states = self.run.formulation.mechanism, self.run.states(list(times))
+        if self.shade is DEFLECTION:
+            return [ChainPose(state.time, mechanism, state) for state in states]
+        stress = chain_stress(self.run, times)
+        each = [[None if own is None else own[k] for own in stress] for k in range(len(states))]
+        return [ChainPose(at.time, mechanism, at, own) for at, own in zip(states, each, strict=True)]
 
     def paths(self, times: Array, magnification: float) -> list[Array]:
         """All times at once."""
@@ -67,11 +73,12 @@ class ChainFigure(Figure):
 
 @dataclass(frozen=True)
 class ChainPose(Pose):
-    """A chain in a state."""
+    """A chain in a state, with the stress at the nodes of its links where colours say that, None of those without."""
 
     time: float
     mechanism: Mechanism
     state: State
+    stress: list[Array | None] | None = None
 
     def points(self, magnification: float) -> list[Array]:
         """(3,) places of the named points."""
@@ -85,6 +92,13 @@ class ChainPose(Pose):
         """(n,) of each link against the equivalent rigid one [m]."""
         return [np.linalg.norm(self._displacement(k), axis=1) for k in self.mechanism.bodies]
 
+    def values(self) -> list[Array]:
+        """(n,) of each link's nodes."""
+        if self.stress is None:
+            return super().values()
+        every = [(self.stress[k], len(self.mechanism.links[k].model.nodes)) for k in self.mechanism.bodies]
+        return [np.full(count, np.nan) if own is None else own for own, count in every]
+
     @property
     def _links(self) -> list[Link]:
         return [self.mechanism.links[k] for k in self.mechanism.bodies]
@@ -96,10 +110,12 @@ class ChainPose(Pose):
     def parts(self, magnification: float, unit: float) -> list[Part]:
         """Deformed links."""
         found = []
-        for link, places, moved in zip(self._links, self.nodes(magnification), self.deflections(), strict=True):
-            model, root = link.model, link.inboard.node
-            surface = part_surface(places, model.triangles, chains(model.nodes, model.lines), root, 1e3 * moved, unit)
-            found.append(Part(surface, bool(len(model.triangles))))
+        for link, places, values in zip(self._links, self.nodes(magnification), self.values(), strict=True):
+            model, root, triangles = link.model, link.inboard.node, link.model.triangles
+            if len(model.heights):
+                places, triangles, values = thick(places, triangles, model.heights, values)
+            surface = part_surface(places, triangles, chains(model.nodes, model.lines), root, values, unit)
+            found.append(Part(surface, bool(len(triangles))))
         return found
 
     def joints(self, magnification: float, unit: float, moving: bool) -> Any:
@@ -128,10 +144,12 @@ class ChainPose(Pose):
         found = []
         for k, places in zip(self.mechanism.bodies, self.nodes(magnification), strict=True):
             link = self.mechanism.links[k]
+            stress = None if self.stress is None else self.stress[k]
+            more = {} if stress is None else {"von_mises_MPa": stress}
             model = link.model
             cells = [(kind, c) for kind, c in (("line", model.lines), ("triangle", model.triangles)) if len(c)]
             cells = cells or [("vertex", np.arange(len(places))[:, None])]
-            found.append(PartMesh(link.name, places, cells, self._displacement(k)))
+            found.append(PartMesh(link.name, places, cells, self._displacement(k), more))
         return found
 
     def _nodes(self, link: int, magnification: float, nodes: Any = slice(None)) -> Array:
@@ -160,9 +178,7 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
     return result
 
 
-def _displaced(
-    mechanism: Mechanism, interface: Any, frame: Array, state: State, number: int, factor: float
-) -> Array:
+def _displaced(mechanism: Mechanism, interface: Any, frame: Array, state: State, number: int, factor: float) -> Array:
     """(4, 4) world pose of a frame that rides on an interface of a deformed link, its displacement against the rigid
     chain magnified.
     """

@@ -33,6 +33,7 @@ def export_paraview(
     times: Sequence[float] | None = None,
     magnification: float = 1.0,
     progress: Progress | None = None,
+    stress: bool = False,
 ) -> None:
     """Write the deformed links, or beams and bodies: NAME.pvd and a folder NAME_files with a .vtu for each time and
     link.
@@ -52,6 +53,8 @@ def export_paraview(
         Of the displacement in the points; 1 is true.
     progress : callable, optional
         Told the times done and their total.
+    stress : bool
+        Whether von Mises stress is point data, too, of shells the largest over the thickness.
 
     Raises
     ------
@@ -65,7 +68,7 @@ def export_paraview(
     target = check_writable(path)
     folder = target.with_name(f"{target.stem}_files")
     _check_replaceable(folder)
-    figure = figure_of(run, magnification)
+    figure = figure_of(run, magnification, stress)
     poses = figure.poses(_times(run, times, _PARAVIEW_TIMES))
     root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     root.append(ET.Comment(f" {MARK} "))
@@ -86,7 +89,7 @@ def export_paraview(
 def _write_mesh(mesh: PartMesh, data: dict[str, Any], path: Path) -> None:
     import meshio
 
-    data = {"displacement": mesh.displacement, **data}
+    data = {"displacement": mesh.displacement, **mesh.more, **data}
     meshio.Mesh(mesh.points, mesh.cells, point_data=data).write(path)
 
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -17,13 +17,25 @@ from erls.run.record import Run
 
 
 @dataclass(frozen=True)
+class Shade:
+    """What colours say: its name, its unit, and whether any of it is worth a colour."""
+
+    name: str
+    unit: str
+    always: bool = False
+
+
+DEFLECTION, STRESS = Shade("deflection", "mm"), Shade("stress", "MPa", True)
+
+
+@dataclass(frozen=True)
 class Part:
     """A link, beam or body as drawn.
 
     Attributes
     ----------
     surface : pyvista.PolyData
-        With the deflection [mm] as the point data "value".
+        With what colours say as the point data "value", not a number where it is not known.
     sharp : bool
         Whether its sharp edges are drawn as lines.
     """
@@ -34,12 +46,15 @@ class Part:
 
 @dataclass(frozen=True)
 class PartMesh:
-    """A link, beam or body for ParaView: (n, 3) points, cells by kind, and true displacements (n, 3) [m]."""
+    """A link, beam or body for ParaView: (n, 3) points, cells by kind, true displacements (n, 3) [m], and what else is
+    known at its points.
+    """
 
     name: str
     points: Array
     cells: list[tuple[str, Any]]
     displacement: Array
+    more: dict[str, Array] = field(default_factory=dict)
 
 
 class Pose(ABC):
@@ -58,6 +73,10 @@ class Pose(ABC):
     @abstractmethod
     def deflections(self) -> list[Array]:
         """(n,) lengths of the displacements of each part's nodes [m]."""
+
+    def values(self) -> list[Array]:
+        """(n,) of each part's nodes, what colours say, in the unit of the figure's shade."""
+        return [1e3 * moved for moved in self.deflections()]
 
     @abstractmethod
     def anchor(self) -> Array:
@@ -88,10 +107,12 @@ class Figure(ABC):
     run : Run
     part : str
         What its parts are called in ParaView.
+    shade : Shade
     """
 
     run: Run
     part: str
+    shade: Shade
 
     @property
     @abstractmethod

@@ -3,25 +3,32 @@
 from __future__ import annotations
 
 from erls.errors import Cause, SceneError
+from erls.run.bodies.mode import BodyMode
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.run import BodyRun
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.view.bodies import BodyFigure
 from erls.view.chain import ChainFigure
-from erls.view.figure import Figure
+from erls.view.figure import DEFLECTION, STRESS, Figure
+from erls.view.stress import no_stress
 
 
-def figure_of(run: Run, magnification: float = 1.0) -> Figure:
-    """What is drawn of a run.
+def figure_of(run: Run, magnification: float = 1.0, stress: bool = False) -> Figure:
+    """What is drawn of a run; ``stress`` says that colours do, rather than deflection.
 
     Raises
     ------
     SceneError
-        BAD_FIELD: a magnification where there is nothing that displacements count from; nothing was computed.
+        BAD_FIELD: a magnification where there is nothing that displacements count from; nothing was computed; stress
+        where nothing holds any, or of modes, whose amplitude means nothing.
     """
+    shade = STRESS if stress else DEFLECTION
     if isinstance(run, ChainRun):
-        return ChainFigure(run)
+        links = [run.formulation.mechanism.links[k].model for k in run.formulation.mechanism.bodies]
+        if stress and not any(m.recovery is not None and m.recovery.quantity == "stress" for m in links):
+            raise no_stress(run)
+        return ChainFigure(run, shade)
     assert isinstance(run, BodyRun)
     if not len(run.times):
         message, remedy = "the run holds nothing to draw", "mend what stopped it, and simulate again"
@@ -29,4 +36,9 @@ def figure_of(run: Run, magnification: float = 1.0) -> Figure:
     if magnification != 1.0 and isinstance(run, BodyMotion):
         message, remedy = "bodies and beams that move have no displacement to magnify", "leave it at 1"
         raise SceneError(Cause.BAD_FIELD, message, where="magnification", value=magnification, remedy=remedy)
-    return BodyFigure(run)
+    if stress and isinstance(run, BodyMode):
+        message, remedy = "modes have no scale, and their stress neither", "leave stress out"
+        raise SceneError(Cause.BAD_FIELD, message, where="stress", value=run.title, remedy=remedy)
+    if stress and not run.assembly.shells:
+        raise no_stress(run)
+    return BodyFigure(run, shade)

@@ -46,6 +46,7 @@ def film(
     speed: float = 1.0,
     size: Size = (1280, 800),
     progress: Progress | None = None,
+    stress: bool = False,
 ) -> None:
     """Film a run from a fixed place.
 
@@ -64,6 +65,8 @@ def film(
         [pixel], rounded down to even numbers.
     progress : callable, optional
         Told the frames done and their total.
+    stress : bool
+        Colours say von Mises stress, of shells the largest over the thickness, rather than deflection.
 
     Raises
     ------
@@ -76,7 +79,7 @@ def film(
     times = _frame_times(run, fps, speed, 50 if Path(path).suffix.lower() == ".gif" else 240)
     size = (size[0] - size[0] % 2, size[1] - size[1] % 2)
     with replacing(path) as temporary:
-        figure = figure_of(run, magnification)
+        figure = figure_of(run, magnification, stress)
         motion = surveyed(figure, magnification, None)
         with drawing(), Stage(figure, motion, magnification, size) as stage, FilmWriter(temporary, size, fps) as writer:
             sides: dict[str, int] = {}

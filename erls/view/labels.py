@@ -98,8 +98,8 @@ class Sheet:
             x, y = camera.project(gravity)
             self.write(x + 0.7 * self.em, y + 0.9 * self.em, "g", "lm", 1.0, "#222222", bold=True)
 
-    def colour_bar(self, colours: Any, largest: float) -> None:
-        """Scale of the deflection at the right [mm]."""
+    def colour_bar(self, colours: Any, largest: float, name: str, unit: str) -> None:
+        """Scale of what colours say, at the right."""
         import PIL.Image
 
         width, height = round(1.1 * self.em), round(self.size[1] * 0.42)
@@ -108,8 +108,8 @@ class Sheet:
         self.image.paste(PIL.Image.fromarray(np.repeat(strip, width, axis=1)), (left, top))
         self._draw.rectangle((left, top, left + width, top + height), outline="#555555")
         self._taken.append((left - self.em, top, left + width, top + height))
-        self.write(left + width / 2, top - 2.9 * self.em, "deflection", "mm", 1.0)
-        self.write(left + width / 2, top - 1.5 * self.em, "[mm]", "mm", 1.0)
+        self.write(left + width / 2, top - 2.9 * self.em, name, "mm", 1.0)
+        self.write(left + width / 2, top - 1.5 * self.em, f"[{unit}]", "mm", 1.0)
         step = round_number(max(largest, 1e-300) / 6)
         for value in np.arange(0, int(largest / step) + 1) * step:
             y = top + height * (1 - value / largest)

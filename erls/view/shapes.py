@@ -111,6 +111,47 @@ def part_surface(
     return joined(parts)
 
 
+def thick(positions: Array, triangles: IntArray, heights: Array, values: Array) -> tuple[Array, IntArray, Array]:
+    """A surface with its thickness: what it was, then the same on top and at the bottom, and its rim.
+
+    Parameters
+    ----------
+    positions : (n, 3) array
+        Nodes.
+    triangles : (t, 3) int array
+        Seen from above anticlockwise.
+    heights : (n, 2) array
+        Of bottom and top over each node, along the mean normal there; at folds so far that both sides keep theirs.
+    values : (n,) array
+
+    Returns
+    -------
+    (3 n, 3), (r, 3), (3 n,) arrays
+    """
+    a, b, c = (positions[triangles[:, k]] for k in range(3))
+    normals = np.cross(b - a, c - a)
+    each = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    mean = np.zeros_like(positions)
+    np.add.at(mean, triangles, normals[:, None])
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    slant, met = np.zeros(len(positions)), np.zeros(len(positions))
+    np.add.at(slant, triangles, np.einsum("tc,tkc->tk", each, mean[triangles]))
+    np.add.at(met, triangles, 1.0)
+    mean /= np.clip(slant / np.maximum(met, 1.0), 0.3, 1.0)[:, None]
+    count = len(positions)
+    places = np.concatenate([positions, *(positions + heights[:, k, None] * mean for k in (1, 0))])
+    edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    known = {(a, b) for a, b in edges.tolist()}
+    rim = np.array([(a, b) for a, b in edges.tolist() if (b, a) not in known], dtype=np.int64).reshape(-1, 2)
+    p, q = rim[:, 0], rim[:, 1]
+    sides = [
+        np.stack([p + 2 * count, q + 2 * count, q + count], axis=1),
+        np.stack([p + 2 * count, q + count, p + count], axis=1),
+    ]
+    whole = np.concatenate([triangles + count, triangles[:, ::-1] + 2 * count, *sides])
+    return places, whole, np.tile(values, 3)
+
+
 def polylines(points: Array, runs: list[list[int]]) -> Any:
     """Curves through points, as pyvista.PolyData."""
     import pyvista as pv

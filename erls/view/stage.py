@@ -13,7 +13,8 @@ from erls.view.camera import Box, Camera, Pixels, Size, Walls, text_unit
 from erls.view.figure import Figure, Pose
 from erls.view.shapes import SHARP, polylines, with_normals
 
-COLOURS = "turbo"  # of the deflection; its dark ends are cut
+COLOURS = "turbo"  # its dark ends are cut
+UNKNOWN = "#b4bac2"
 GHOST = (0.42, 0.50, 0.60)
 PARTS = ("#3d6b99", "#c26a2d", "#4f8a5b", "#8a5a96", "#a04848", "#4a8f95")
 POINTS = ("#b3123f", "#1d4e89", "#2f7d32", "#7b3fa0", "#a65a00", "#00707a")
@@ -33,7 +34,9 @@ class Motion:
         Of the named points [m].
     box : Box
     largest : float
-        Largest deflection [m].
+        Largest of what colours say.
+    elastic : bool
+        Whether that is worth a colour.
     unit : float
         Radius of a tube [m].
     """
@@ -42,6 +45,7 @@ class Motion:
     paths: list[Array]
     box: Box
     largest: float
+    elastic: bool
     unit: float
 
     @classmethod
@@ -60,18 +64,14 @@ class Motion:
             for positions in p.nodes(magnification):
                 extent += [positions.min(axis=0), positions.max(axis=0)]
             if shown is None or p is shown[-1]:
-                largest = max(largest, *(float(moved.max()) for moved in p.deflections()))
+                largest = max(largest, *(float(np.fmax.reduce(x, initial=0.0)) for x in p.values()))
         points = np.concatenate([np.array(extent), *paths])
         if not (np.abs(points) < 1e15).all():
             return None
         unit = max(unit, 0.0065 * float(np.ptp(points, axis=0).max()), 1e-6)
         points = np.concatenate([points - unit, points + unit])
-        return cls(times, paths, Box.around(points), largest, unit)
-
-    @property
-    def elastic(self) -> bool:
-        """Whether there is a deflection worth a colour."""
-        return self.largest > 1e-9 * self.unit / 0.01
+        shown_at_all = largest > 0.0 if figure.shade.always else largest > 1e-4 * unit
+        return cls(times, paths, Box.around(points), largest, shown_at_all, unit)
 
 
 class Stage:
@@ -194,9 +194,9 @@ class Stage:
             if ghost:
                 actors.append(self._add(part.surface, color=GHOST, scalars=None))
             elif motion.elastic:
-                limits = [0.0, 1e3 * motion.largest]
+                limits = [0.0, motion.largest]
                 look = {"scalars": "value", "cmap": colour_map(), "clim": limits, "show_scalar_bar": False}
-                actors.append(self._add(part.surface, **look))
+                actors.append(self._add(part.surface, nan_color=UNKNOWN, **look))
             else:
                 actors.append(self._add(part.surface, color=PARTS[k % len(PARTS)], scalars=None))
             if part.sharp and not ghost:
@@ -234,7 +234,7 @@ class Stage:
 
 
 def colour_map() -> Any:
-    """Colours of the deflection."""
+    """Colours of deflection and stress."""
     import matplotlib
     from matplotlib.colors import ListedColormap
 

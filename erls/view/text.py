@@ -22,7 +22,8 @@ def written(stage: Stage, pixels: Pixels, caption: str) -> Sheet:
     sheet.axes(stage.walls)
     sheet.triad(stage.camera, stage.corner, stage.gravity)
     if stage.motion.elastic:
-        sheet.colour_bar(colour_map(), 1e3 * stage.motion.largest)
+        shade = stage.figure.shade
+        sheet.colour_bar(colour_map(), stage.motion.largest, shade.name, shade.unit)
     return sheet
 
 

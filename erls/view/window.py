@@ -57,7 +57,8 @@ class Window(Stage):
         self.plotter.add_text(caption, font_size=11, color="black")
         self.show_time(start)
         if self.motion.elastic:
-            bar = {"title": "deflection [mm]", "vertical": True, "position_x": 0.9, "position_y": 0.3, "height": 0.4}
+            title = f"{self.figure.shade.name} [{self.figure.shade.unit}]"
+            bar = {"title": title, "vertical": True, "position_x": 0.9, "position_y": 0.3, "height": 0.4}
             self.plotter.add_scalar_bar(mapper=self._actors["pose"][0].mapper, color="black", n_labels=6, **bar)
         axis = self.figure.run.axis
         title = f"{axis.symbol} [{axis.unit}]" if axis.unit else axis.name

@@ -90,6 +90,23 @@ class Laminate:
         result[3:6, :3] = result[:3, 3:6].T
         return (result + result.T) / 2
 
+    def surfaces(self) -> Array:
+        """(3, 5, 8) stress 11, 22, 12, 13, 23 by the strains of the section, at bottom, middle and top.
+
+        Shear across is that of a parabola where there is one layer, 3/2 of its mean in the middle and none outside; of
+        several the mean.
+        """
+        heights, layers = self.heights, self.layers
+        middle = (heights[0] + heights[-1]) / 2
+        inside = min(int(np.searchsorted(heights, middle, side="right")) - 1, len(layers) - 1)
+        shares = (0.0, 1.5, 0.0) if len(layers) == 1 else (1.0, 1.0, 1.0)
+        result = np.zeros((3, 5, 8))
+        for k, (layer, height) in enumerate(zip((0, inside, -1), (heights[0], middle, heights[-1]), strict=True)):
+            plane = layers[layer].turned_plane
+            result[k, :3, :3], result[k, :3, 3:6] = plane, height * plane
+            result[k, 3:, 6:] = shares[k] * SHEAR_CORRECTION * layers[layer].turned_shear
+        return result
+
     def moments(self) -> Array:
         """(3,) ∫ρ dz, ∫ρ z dz, ∫ρ z² dz."""
         result, heights = np.zeros(3), self.heights

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,6 +30,8 @@ class LinkShells:
     masses : (m, 13) array
         Rigid bodies on nodes: mass, centre of mass from the node (3,), inertia about that (3, 3), in mesh axes.
     mass_nodes : (m,) int array
+    surfaces : (k, 3, 5, 8) array
+        Stress at bottom, middle and top by the strains of the section, see `Laminate.surfaces`; (0, ...) unknown.
     others : tuple of str
         What else the mesh file attaches, by its keywords.
     """
@@ -42,6 +44,7 @@ class LinkShells:
     drilling: float
     masses: Array
     mass_nodes: IntArray
+    surfaces: Array = field(default_factory=lambda: np.zeros((0, 3, 5, 8)))
     others: tuple[str, ...] = ()
 
     @property

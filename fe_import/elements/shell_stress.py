@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from fe_import.elements.elasticity import PAIRS
-from fe_import.elements.laminates import SHEAR_CORRECTION, Lamina, Laminate
+from fe_import.elements.laminates import Laminate
 from fe_import.elements.shell import ShellBlock, element_matrices
 from fe_import.elements.shell_strains import strains
 from fe_import.model import Array, IntArray
@@ -90,6 +90,16 @@ class ShellStress:
         """(p, 3, 3) axes of the mesh frame."""
         return np.tile(np.eye(3), (len(sites), 1, 1))
 
+    @property
+    def heights(self) -> Array:
+        """(n, 2) of bottom and top above each node [m]; the mean of shells of several makes."""
+        total, count = np.zeros((len(self.positions), 2)), np.zeros((len(self.positions), 1))
+        for part in self.parts:
+            own = part.laminate.heights
+            np.add.at(total, part.block.nodes, np.array([own[0], own[-1]]))
+            np.add.at(count, part.block.nodes, 1.0)
+        return np.asarray(self.length * total / np.maximum(count, 1.0))
+
     def evaluate(self, fields: Array, dof_map: IntArray, sites: IntArray) -> Array:
         """(p, 6, m) stress xx, yy, zz, xy, yz, zx [Pa] of displacement fields (d, m), mesh axes."""
         place = np.full(len(self.positions), -1, dtype=np.int64)
@@ -121,9 +131,8 @@ class ShellStress:
         frames = np.einsum("kq,eqic->ekic", to_corners, at.axes)
         frames /= np.linalg.norm(frames, axis=-1, keepdims=True)
         result = np.zeros((*strain.shape[:2], len(SURFACES), 6, count))
-        for k, (layer, height, share) in enumerate(_looked_at(part.laminate)):
-            plane = layer.turned_plane @ (strain[:, :, :3] + height * strain[:, :, 3:6])
-            shear = share * (layer.turned_shear @ strain[:, :, 6:])
+        for k, moduli in enumerate(part.laminate.surfaces()):
+            plane, shear = moduli[:3] @ strain, moduli[3:] @ strain
             local = np.zeros((*strain.shape[:2], 3, 3, count))
             for row, (i, j) in enumerate(((0, 0), (1, 1), (0, 1))):
                 local[:, :, i, j] = local[:, :, j, i] = plane[:, :, row]
@@ -150,20 +159,6 @@ def extrapolation(block: ShellBlock) -> Array:
     """(k, q) from the points of the quadrature to the corners, by the polynomial through them."""
     shapes, _ = block.element.shapes(block.element.points)
     return np.asarray(np.linalg.inv(shapes))
-
-
-def _looked_at(laminate: Laminate) -> list[tuple[Lamina, float, float]]:
-    """Layer, height and share of mean shear at bottom, middle and top."""
-    heights, layers = laminate.heights, laminate.layers
-    middle = (heights[0] + heights[-1]) / 2
-    inside = min(int(np.searchsorted(heights, middle, side="right")) - 1, len(layers) - 1)
-    one = len(layers) == 1
-    outer = 0.0 if one else SHEAR_CORRECTION
-    return [
-        (layers[0], float(heights[0]), outer),
-        (layers[inside], float(middle), 1.5 * SHEAR_CORRECTION if one else SHEAR_CORRECTION),
-        (layers[-1], float(heights[-1]), outer),
-    ]
 
 
 def shell_stress(

@@ -7,6 +7,7 @@ import enum
 import re
 import stat
 import tomllib
+from collections.abc import Collection
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -320,6 +321,14 @@ def place_of(
             return at, place
         at = at[place]
     raise AssertionError("a key has steps")
+
+
+def as_spelt(value: str, names: Collection[str]) -> str:
+    """A name of a set as its file spells it: the only one that differs in case alone; else the value as it is."""
+    if value in names:
+        return value
+    alike = [name for name in names if name.casefold() == value.casefold()]
+    return alike[0] if len(alike) == 1 else value
 
 
 def choose(value: str, options: Any, where: str, error: type[ReportedError] = FEImportError) -> None:

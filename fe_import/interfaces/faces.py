@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from fe_import.elements.solid_mesh import SolidMesh, surface_triangles
 from fe_import.errors import Cause, FEImportError
+from fe_import.files.toml import as_spelt
 from fe_import.interfaces.weights import area_weights
 from fe_import.model import Array, IntArray
 
@@ -87,6 +88,7 @@ def interface_face(
     FEImportError
         ``INTERFACE``: no such node set, an empty one, or area weights of nodes without area.
     """
+    node_set = as_spelt(node_set, mesh.node_sets)
     if node_set not in mesh.node_sets:
         known = ", ".join(sorted(mesh.node_sets)) or "none"
         kind = "a set of solid elements" if node_set in mesh.element_sets else "not in the mesh"

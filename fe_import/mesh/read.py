@@ -19,7 +19,7 @@ from fe_import.elements.shell_elements import SHELL_ELEMENTS
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import ElementBlock, ShellCells, SolidMesh
 from fe_import.errors import Cause, FEImportError
-from fe_import.files.toml import choose
+from fe_import.files.toml import as_spelt, choose
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
 from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
@@ -201,9 +201,10 @@ def _shell_cells(raw: RawMesh, wanted: Wanted, where: str) -> dict[int, IntArray
     """Cells of each block that are shells, type by type in the order in which types come first."""
     chosen = {b: np.arange(len(block.cells)) for b, block in enumerate(raw.blocks) if block.dimension == 2}
     if wanted.shell_sets:
-        for name in wanted.shell_sets:
+        names = [as_spelt(name, raw.cell_sets) for name in wanted.shell_sets]
+        for name in names:
             choose(name, raw.cell_sets, f"{where}: set of shells")
-        members = [raw.cell_sets[name] for name in wanted.shell_sets]
+        members = [raw.cell_sets[name] for name in names]
         for b in chosen:
             own = [_indices(per_block[b], len(raw.blocks[b].cells)) for per_block in members if b < len(per_block)
                    and per_block[b] is not None]  # fmt: skip

@@ -87,6 +87,7 @@ def _check_shapes(model: ModalModel, check: Check) -> None:
         ("health/limits", np.array([c.limit for c in model.health], dtype=float), (None,), "f"),
         ("pictures/lines", model.lines, (None, 2), "i"),
         ("pictures/triangles", model.triangles, (None, 3), "i"),
+        ("pictures/heights", model.heights, (len(model.heights) and len(model.nodes), 2), "f"),
     ]
     for number, one in enumerate(model.interface_nodes, start=1):
         place = f"interfaces/{number:04d}"
@@ -96,9 +97,7 @@ def _check_shapes(model: ModalModel, check: Check) -> None:
     for item, values, shape, kind in arrays:
         array = np.asarray(values)
         check(array.dtype.kind == kind, item, "wrong data type", array.dtype.name)
-        fits = array.ndim == len(shape) and all(
-            w in (None, s) for w, s in zip(shape, array.shape, strict=True)
-        )
+        fits = array.ndim == len(shape) and all(w in (None, s) for w, s in zip(shape, array.shape, strict=True))
         expected = ", ".join("any" if s is None else str(s) for s in shape)
         check(fits, item, f"wrong shape, expected ({expected})", array.shape)
         check.each(np.isfinite(array), array, item, "not finite")
@@ -158,20 +157,14 @@ def _check_interfaces(model: ModalModel, check: Check) -> None:
     names: set[str] = set()
     for number, one in enumerate(model.interface_nodes, start=1):
         group = f"interfaces/{number:04d}"
-        check(
-            _storable(one.name) and one.name, f"{group}/name", "a name must not be empty, UTF-8 without NUL"
-        )
+        check(_storable(one.name) and one.name, f"{group}/name", "a name must not be empty, UTF-8 without NUL")
         check(one.name not in names, f"{group}/name", "an interface name stands twice", one.name)
         names.add(one.name)
         check(one.coupling in COUPLINGS, f"{group}/coupling", "unknown", one.coupling, " or ".join(COUPLINGS))
         check(0 <= one.node < n, f"{group}/node", "no such node", one.node, f"0 to {n - 1}")
-        check(
-            one.node in model.rotation_nodes, f"{group}/node", "an interface node needs rotations", one.node
-        )
+        check(one.node in model.rotation_nodes, f"{group}/node", "an interface node needs rotations", one.node)
         off = np.abs(one.position - model.nodes[one.node]).max()
-        check(
-            off <= 1e-6 * size, f"{group}/position", "not the position of its node", float(off), 1e-6 * size
-        )
+        check(off <= 1e-6 * size, f"{group}/position", "not the position of its node", float(off), 1e-6 * size)
         coupled, weights = one.coupled_nodes, one.weights
         check(len(coupled) > 0, f"{group}/coupled_nodes", "moves no node")
         inside = (coupled >= 0) & (coupled < n)

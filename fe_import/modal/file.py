@@ -31,7 +31,7 @@ from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.modal.recovery_file import read_recovery, write_recovery
 from fe_import.modal.second_order_file import read_second_order, write_second_order
 from fe_import.modal.thermal_file import read_thermal, write_thermal
-from fe_import.model import IntArray, InterfaceNode
+from fe_import.model import Array, IntArray, InterfaceNode
 
 SCHEMA = "erls modal model"
 SCHEMA_VERSION = 4
@@ -125,6 +125,8 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
         ("pictures/triangles", model.triangles, "1", "surface triangles for pictures; nodes from 0"),
     ):
         write_array(group, name, values, unit, description)
+    if len(model.heights):
+        write_array(group, "pictures/heights", model.heights, "m", "bottom and top of shells above each node")
     write_strings(group, "kinds", model.kinds, "what moves in each mode")
     write_strings(group, "health/names", tuple(c.name for c in model.health), "checks of the reduction")
     write_strings(group, "node_names/names", tuple(model.node_names), "names of node_names/nodes")
@@ -216,9 +218,17 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         if "second_order" in inside
         else None,
         thermal=read_thermal(file.subgroup("thermal"), m) if "thermal" in inside else None,
+        heights=_read_heights(file, n),
     )
     validate(model, where, (group.name or "").rstrip("/"))
     return model
+
+
+def _read_heights(file: Reader, nodes: int) -> Array:
+    """Of shells, where there are some."""
+    if "heights" not in file.subgroup("pictures").names_inside():
+        return np.zeros((0, 2))
+    return file.array("pictures/heights", (nodes, 2))
 
 
 def _read_node_names(file: Reader, nodes: int) -> dict[str, int]:

@@ -85,6 +85,8 @@ class ModalModel:
     health : tuple of HealthCheck
     lines, triangles : (l, 2), (t, 3) int arrays
         For pictures.
+    heights : (n, 2) array
+        Of the bottom and the top of shells above each node, along their normals, for pictures; (0, 2) without any [m].
     provenance : dict of str
         Source file, SHA-256, tool versions, method, options.
     recovery : RecoveryMaps or None
@@ -118,6 +120,7 @@ class ModalModel:
     recovery: RecoveryMaps | None = None
     second_order: SecondOrder | None = None
     thermal: ThermalExpansion | None = None
+    heights: Array = field(default_factory=lambda: np.zeros((0, 2)))
 
     @property
     def modes(self) -> int:

@@ -28,11 +28,12 @@ def link_shells(link: LinkFile) -> LinkShells:
     mesh = mesh_of(link)
     parts = shell_parts(description, shell, mesh, where)
     cells, make = np.zeros((mesh.shell_count, 4), dtype=np.int64), np.zeros(mesh.shell_count, dtype=np.int64)
-    stiffness, moments, directions = [], [], []
+    stiffness, moments, directions, surfaces = [], [], [], []
     for k, part in enumerate(parts):
         cells[part.numbers], make[part.numbers] = four_cornered(part.block.nodes), k
         stiffness.append(part.block.stiffness[0])
         moments.append(part.block.moments[0])
+        surfaces.append(part.laminate.surfaces())
         directions.append(np.zeros(3) if part.block.reference is None else part.block.reference[0])
     masses = [item for item in mesh.attachments if isinstance(item, AttachedMass)]
     others = {item.keyword: None for item in mesh.attachments if not isinstance(item, AttachedMass)}
@@ -45,5 +46,6 @@ def link_shells(link: LinkFile) -> LinkShells:
         shell.drilling,
         np.array([[m.mass, *m.offset, *np.ravel(m.inertia)] for m in masses]).reshape(-1, 13),
         np.array([m.node for m in masses], dtype=np.int64),
+        np.array(surfaces),
         tuple(others),
     )

@@ -7,7 +7,7 @@ import numpy as np
 from fe_import.description.records import Interface, LinkDescription, Matrices
 from fe_import.errors import Cause, FEImportError
 from fe_import.exports import Export
-from fe_import.files.toml import choose
+from fe_import.files.toml import as_spelt, choose
 from fe_import.interfaces.faces import InterfaceFace
 from fe_import.model import Array, IntArray, InterfaceNode
 
@@ -116,8 +116,9 @@ def _seat(interface: Interface, export: Export, names: dict[str, int], place: st
 
 
 def _face(interface: Interface, export: Export, dense: IntArray, place: str) -> InterfaceFace:
-    choose(interface.face, export.node_sets, f"{place}.face")
-    members = export.node_sets[interface.face]
+    name = as_spelt(interface.face, export.node_sets)
+    choose(name, export.node_sets, f"{place}.face")
+    members = export.node_sets[name]
     if not len(members):
         raise FEImportError(
             Cause.INTERFACE,

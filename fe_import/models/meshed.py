@@ -20,7 +20,7 @@ from fe_import.elements.solid_mesh import FILLING, SolidMesh, surface_triangles
 from fe_import.elements.solid_orders import raised, with_incompatible_modes
 from fe_import.elements.solid_stress import solid_stress
 from fe_import.errors import Cause, FEImportError
-from fe_import.files.toml import choose
+from fe_import.files.toml import as_spelt, choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
 from fe_import.mesh.read import Wanted, read_mesh
@@ -174,16 +174,17 @@ def _materials(link: LinkDescription, solid: Solid, mesh: SolidMesh, where: str)
     result = []
     for k, region in enumerate(solid.regions):
         choose(region.material, link.materials, f"{where}: solid.regions[{k}].material")
-        if region.set in mesh.lost_sets and region.set not in mesh.element_sets:
+        name = as_spelt(region.set, mesh.element_sets.keys() | mesh.lost_sets.keys())
+        if name in mesh.lost_sets and name not in mesh.element_sets:
             raise FEImportError(
                 Cause.MESH,
-                f"set {region.set!r} of the mesh is not usable: {mesh.lost_sets[region.set]}",
+                f"set {name!r} of the mesh is not usable: {mesh.lost_sets[name]}",
                 where=f"{where}: solid.regions[{k}].set",
                 remedy="mend the set in the mesh file",
             )
-        choose(region.set, mesh.element_sets, f"{where}: solid.regions[{k}].set")
+        choose(name, mesh.element_sets, f"{where}: solid.regions[{k}].set")
         m = link.materials[region.material]
-        elements = mesh.element_sets[region.set]
+        elements = mesh.element_sets[name]
         result.append(SolidMaterial(m.youngs_modulus, m.poissons_ratio, m.density, elements))
     return result
 

@@ -13,7 +13,7 @@ from fe_import.elements.shell import ShellBlock, element_matrices, lumped
 from fe_import.elements.shell_stress import ShellPart
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
-from fe_import.files.toml import choose
+from fe_import.files.toml import as_spelt, choose
 from fe_import.model import Array, IntArray
 from fe_import.models.attached import AttachedNodes, Entries
 
@@ -110,8 +110,9 @@ def _assigned(sets: list[tuple[str, str]], mesh: SolidMesh, where: str) -> IntAr
     which = np.full(mesh.shell_count, -1, dtype=np.int64)
     for k, (name, field) in enumerate(sets):
         place = f"{where}: {field}"
-        choose(name, mesh.shell_sets, place)
-        own = mesh.shell_sets[name]
+        spelt = as_spelt(name, mesh.shell_sets)
+        choose(spelt, mesh.shell_sets, place)
+        own = mesh.shell_sets[spelt]
         if (which[own] >= 0).any():
             other = sets[int(which[own].max())][0]
             raise FEImportError(

@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_import.description.records import Recovery
 from fe_import.errors import Cause, FEImportError
-from fe_import.files.toml import choose
+from fe_import.files.toml import as_spelt, choose
 from fe_import.modal.inertia import turned
 from fe_import.modal.model import ModalModel
 from fe_import.modal.recovery_maps import SPIN_PAIRS, RecoveryMaps
@@ -72,8 +72,9 @@ def chosen_sites(model: FEModel, source: StressSource, wanted: Recovery, where: 
         choose(name, model.node_names, f"{where}: recovery.nodes[{k}]")
         asked |= source.site_nodes == model.node_names[name]
     for k, name in enumerate(wanted.sets):
-        choose(name, source.sets, f"{where}: recovery.sets[{k}]")
-        asked[source.sets[name]] = True
+        spelt = as_spelt(name, source.sets)
+        choose(spelt, source.sets, f"{where}: recovery.sets[{k}]")
+        asked[source.sets[spelt]] = True
     if not asked.any():
         raise FEImportError(
             Cause.BAD_FIELD,

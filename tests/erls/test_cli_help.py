@@ -38,7 +38,8 @@ OPTIONS = {
     "examples copy": ["--json"],
     "schema": ["--output", "-o", "--force", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--fps", "--speed", "--overlay", "--force", "--json"],
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--stress", "--fps", "--speed", "--overlay", "--force",
+             "--json"],
 }
 
 

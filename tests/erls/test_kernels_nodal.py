@@ -167,7 +167,7 @@ def test_one_matrix_for_two_seconds() -> None:
 
 def test_the_band_is_as_wide_for_any_number_of_elements() -> None:
     """So that cost is linear: two neighbouring nodes, or a node and its joint."""
-    assert [_l_shape(n).width for n in (2, 16, 64)] == [11, 11, 11]
+    assert [_l_shape(n).elimination.width for n in (2, 16, 64)] == [11, 11, 11]
 
 
 @pytest.mark.parametrize("compiled", [False, True])

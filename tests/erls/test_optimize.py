@@ -276,6 +276,54 @@ def test_pictures_are_true_to_scale() -> None:
     assert len(arm.triangles) == 2 * (2 * 4 + 2 * 2)  # two prisms of four sides
 
 
+def test_links_without_a_shape_hide_no_other() -> None:
+    """Constants alone say nothing of how large a section is: that link is drawn by its lines, and no stress of it can
+    be limited; the other one has both.
+    """
+    constants = (
+        'links.forearm.model.sections.bare={shape="constants", area=1e-3, inertia_y=1e-7, inertia_z=1e-7,'
+        'torsion_constant=2e-7, shear_factor_y=0.5, shear_factor_z=0.5}'
+    )
+    stress = 'constraints=[{type="stress", name="s", limit=5e6, samples=2, links=["upper_arm"]}]'
+    key = "links.upper_arm.model.sections.near.outer_diameter"
+    first = f'variables=[{{name="d1", keys=["{key}"], lower=0.02, upper=0.06}}]'
+    bare = [f'links.forearm.model.frame.members.{k}.section="bare"' for k in (0, 1)]
+    scene = ", ".join(f"'{change}'" for change in ("simulation.duration=0.002", constants, *bare))
+    changes = [f"set=[{scene}]", stress, first, "published={}"]
+    problem = load_problem(DATA / "slide_robot.toml", [*changes, "objective=[]"])
+    found = simulated(problem, problem.start, lambda text: None)
+    assert found.values["s"] > 0
+    upper, fore = found.shapes
+    assert len(upper.triangles) == 2 * (2 * 12 + 2 * 10)  # two prisms of twelve sides
+    assert fore.lines
+    assert not fore.triangles
+    other = load_problem(DATA / "slide_robot.toml", [*changes, "objective=[]", 'constraints.0.links=["forearm"]'])
+    with pytest.raises(SceneError, match="how large this section is"):
+        Dynamics(other, Memory(other))
+
+
+PUBLISHED = [
+    ("app2", 0.9989, 0.9995),
+    ("app1", 0.9963, 0.9948),
+    ("app1_inertial", 1.0012, 0.9993),
+    ("slide_robot", 1.0063, 1.0084),
+]
+
+
+@pytest.mark.parametrize(("name", "loaded", "integrated"), PUBLISHED)
+def test_published_designs(name: str, loaded: float, integrated: float) -> None:
+    """The largest deflections [mm] over all steps, as an independent program of the papers' elements has them; and the
+    stress of the slides, far within its limit.
+    """
+    problem = load_problem(DATA / f"{name}.toml", ['constraints.0.samples="every-step"'])
+    dynamics = Dynamics(problem, Memory(problem))
+    for expected, known in zip((loaded, integrated), problem.record.published.values(), strict=True):
+        found = dynamics.evaluate(np.array([known.variables[v] for v in problem.names]))
+        values = [m.value(c).max() for m, c in zip(dynamics.rules.measures, found.components, strict=True)]
+        assert 1e3 * values[0] == pytest.approx(expected, abs=1e-4)
+        assert all(stress < 0.15 * 75e6 for stress in values[1:])
+
+
 def test_a_copy_elsewhere_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """By the name of the option that asked for it."""
     assert main(["optimize", str(CANTILEVER), "--scene", str(tmp_path / "best.toml")]) == 2
@@ -299,6 +347,50 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert -run.position("tip", 0.0)[2] == pytest.approx(5e-3, rel=1e-4)
     mass = run.formulation.mechanism.links[0].model.mass_properties.mass
     assert mass == pytest.approx(exact_cantilever()[2], rel=1e-4)
+
+
+def test_choice_of_a_material(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Masses go as ρ E^(-1/3); known designs of all options are not run again, and the copy has the best of them."""
+    copy, state, page = DATA / "chosen_by_a_test.toml", tmp_path / "state.npz", tmp_path / "page.html"
+    problem = ["optimize", str(DATA / "material.toml"), "--json", "--state", str(state)]
+    changes = ["--set", 'settings.methods=["esl-system"]', "--set", BRIEF]
+    try:
+        assert main([*problem, *changes, "--scene", str(copy)]) == 0
+        first = capsys.readouterr()
+        run = erls.simulate(erls.load_scene(copy), verdict=False)
+    finally:
+        copy.unlink(missing_ok=True)
+    told = json.loads(first.out)
+    assert told["chosen"] == {"material": "aluminium"}
+    mass, steel = exact_cantilever()[2], 7850 * 2e11 ** (-1 / 3)
+    values = {"steel": (7850, 2e11), "aluminium": (2700, 72e9), "titanium": (4430, 110e9)}
+    for one in told["choices"]:
+        density, modulus = values[one["options"]["material"]]
+        assert one["objective"] == pytest.approx(mass * density * modulus ** (-1 / 3) / steel, rel=5e-5)
+    assert told["methods"]["esl-system"]["mass"] == pytest.approx(min(one["mass"] for one in told["choices"]))
+    assert run.formulation.mechanism.links[0].model.mass_properties.mass == pytest.approx(
+        told["methods"]["esl-system"]["mass"], rel=1e-4
+    )
+    known = {name for name in np.load(state).files if name.endswith(".poses")}
+    assert main([*problem, *changes, "--resume", "-o", str(page)]) == 0
+    assert {name for name in np.load(state).files if name.endswith(".poses")} == known
+    assert "Choices" in page.read_text()
+    assert "chosen" in page.read_text()
+
+
+CHOICES = [
+    ('[{name="m", options={a=[]}}]', "nothing to choose", "choices[0].options"),
+    ('[{name="m", options={a=[], "b/c"=[]}}]', "a name is one line", "choices[0].options.b/c"),
+    ('[{name="m", options={a=[], b=["links.arm.colour=1"]}}]', "unknown field", "colour"),
+    ("[" + ", ".join(f'{{name="m{k}", options={{a=[], b=[]}}}}' for k in range(7)) + "]", "too many", "choices"),
+]
+
+
+@pytest.mark.parametrize(("choices", "message", "where"), CHOICES)
+def test_faulty_choices(choices: str, message: str, where: str) -> None:
+    with pytest.raises(SceneError, match=message) as refusal:
+        load_problem(CANTILEVER, [f"choices={choices}"])
+    assert where in refusal.value.where
 
 
 FAULTS = [

@@ -5,10 +5,12 @@ from __future__ import annotations
 import functools
 import sys
 import tempfile
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 import scipy.sparse as sp
@@ -22,12 +24,14 @@ from erls.equations.nodal.parts import LinkParts, carried, link_parts
 from erls.equations.nodal.rigid_body import RigidBodies
 from erls.equations.nodal.shell import Shells
 from erls.equations.nodal.surfaces import corner_frames
-from erls.errors import SceneError
+from erls.errors import Cause, SceneError
 from erls.maths.se3 import pose
 from erls.mechanism.links import Link
 from erls.run.chain.run import ChainRun
+from erls.run.chain.shells_file import read_shells, write_shells
 from erls.run.file import load_run, save_run
 from fe_import.description.link import load_link
+from fe_import.files.hdf5.values import Reader
 from fe_import.models.link_shells import link_shells
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
@@ -201,6 +205,56 @@ def test_a_shell_link_judges_the_others(tmp_path: Path) -> None:
     again = load_run(tmp_path / "run.h5")
     assert isinstance(again, ChainRun)
     np.testing.assert_array_equal(again.position("tip", times), places["nodal"])
+
+
+def _negative(at: tuple[int, ...]) -> Callable[[Array], None]:
+    def change(values: Array) -> None:
+        values[at] *= -1.0
+
+    return change
+
+
+def _put(at: tuple[int, ...], value: float) -> Callable[[Array], None]:
+    def change(values: Array) -> None:
+        values[at] = value
+
+    return change
+
+
+HOSTILE: tuple[tuple[str, Callable[[Array], None], str], ...] = (
+    ("stiffness", _negative((0,)), "row 0 is not symmetric and positive"),
+    ("stiffness", _negative((0, 3, 3)), "row 0 is not symmetric and positive"),  # of bending, a millionth of membranes
+    ("stiffness", _put((0, 0, 1), 0.0), "row 0 is not symmetric and positive"),
+    ("stiffness", _put((), 0.0), "row 0 is not symmetric and positive"),
+    ("moments", _negative((0, 2)), "row 0 is of no density"),
+    ("moments", _put((0, 1), 100.0), "row 0 is of no density"),
+    ("drilling", _put((), -0.5), "a stiffness is not negative"),
+    ("cells", _put((1, 1), 1), "row 1 is no quadrangle or triangle"),
+    ("masses", _put((0, 0), -1.0), "row 0 is negative"),
+    ("masses", _put((0, 5), 1.0), "row 0 is not of a symmetric and positive inertia"),
+)
+
+
+def test_embedded_shells_are_checked(tmp_path: Path) -> None:
+    """Signs and symmetry of what a run file says of shells: refused by name, never integrated."""
+    link = link_of(described(tmp_path, strip(2, 2)))
+    assert link.shells is not None
+    mass = np.array([[1.0, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3, 0, 0, 0, 1e-3]])
+    shells = replace(link.shells, masses=mass, mass_nodes=np.array([0]))
+    for name, change, told in ((None, None, None), *HOSTILE):
+        with h5py.File(tmp_path / "file.h5", "w") as file:
+            write_shells(file.create_group("shells"), shells)
+            reader = Reader(file["shells"], "file.h5", SceneError, Cause.RUN_FILE)
+            if name is None:
+                np.testing.assert_array_equal(read_shells(reader, 99).stiffness, shells.stiffness)
+                continue
+            values = np.array(file["shells"][name][()])
+            assert change is not None
+            assert told is not None
+            change(values)
+            file["shells"][name][...] = values
+            with pytest.raises(SceneError, match=told):
+                read_shells(reader, 99)
 
 
 def test_what_nodal_shells_cannot_do_is_named(tmp_path: Path) -> None:

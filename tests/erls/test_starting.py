@@ -50,6 +50,11 @@ def test_starts_are_written_and_run(
     assert json.loads(capsys.readouterr().out)["trust"]["verdict"] == "good"
     text = (tmp_path / kind / "scene.toml").read_text(encoding="utf-8")
     assert "# What to change" in text.replace("\n# ", " # ")
+    for file in (tmp_path / kind).rglob("*.toml"):
+        name = file.read_text(encoding="utf-8").splitlines()[0].removeprefix("#:schema ")
+        schema = json.loads((file.parent / name).read_text(encoding="utf-8"))
+        assert name.rpartition("/")[2] == f"{_kind(_read(file))}.schema.json"
+        assert Draft202012Validator(schema).is_valid(_read(file))
     assert main(["new", kind]) == 2
     assert "there is a file or folder of that name" in capsys.readouterr().err
 

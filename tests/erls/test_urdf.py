@@ -10,6 +10,7 @@ import json
 import re
 import shutil
 import tomllib
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -55,10 +56,15 @@ def written(name: str, folder: Path, content: str = "", **more: Any) -> Path:
     return path
 
 
+def uncoupled(name: str) -> str:
+    """The text of a robot whose joints all move alone, as those of the reference do."""
+    return re.sub(r"<mimic[^>]*/>", "", described(name).read_text(encoding="utf-8"))
+
+
 @pytest.mark.parametrize("name", ROBOTS)
 def test_poses_are_those_of_an_independent_program(name: str, reference: dict[str, Any], tmp_path: Path) -> None:
     """Frames of outermost links at 20 configurations to 1e-12: rounding of products of ten poses of some metres."""
-    scene = erls.load_chain(written(name, tmp_path))
+    scene = erls.load_chain(written(name, tmp_path, uncoupled(name)))
     formulation = formulate(build_mechanism(scene).mechanism, scene.record.simulation)
     joints = [joint.name for joint in formulation.mechanism.joints]
     order = [list(reference[f"{name}_joints"]).index(joint) for joint in joints]
@@ -79,7 +85,7 @@ def test_accelerations_are_those_of_an_independent_program(
     """Under gravity, with rates, without damping: masses, centres and inertias, merged links included, to 1e-9 of the
     largest, which the condition of mass matrices of fingers on arms (1e5) makes of rounding.
     """
-    text = re.sub(r"<dynamics[^>]*/>", "", described(name).read_text(encoding="utf-8"))
+    text = re.sub(r"<dynamics[^>]*/>", "", uncoupled(name))
     path = written(name, tmp_path, text)
     for q, v, a in zip(*(reference[f"{name}_{what}"] for what in "qva"), strict=False):
         starts = [
@@ -169,10 +175,22 @@ def _folders(folder: Path, *names: str) -> tuple[str, ...]:
     return names
 
 
+def test_mimic_joints_are_couplings(tmp_path: Path) -> None:
+    """Fingers of the same robot move alike, by multiplier and offset; one whose leader is held moves alone."""
+    robot = read_urdf(FOLDER / "panda.urdf")
+    (coupling,) = tomllib.loads(imported(robot, FOLDER / "panda.urdf", tmp_path, {}, hold=True).scene)["couplings"]
+    assert (coupling["joint"], coupling["follows"]) == ("panda_finger_joint2", {"panda_finger_joint1": 1.0})
+    joints = [replace(joint, multiplier=-2.0, offset=0.1) if joint.mimics else joint for joint in robot.joints]
+    changed = imported(replace(robot, joints=tuple(joints)), FOLDER / "panda.urdf", tmp_path, {})
+    (coupling,) = tomllib.loads(changed.scene)["couplings"]
+    assert (coupling["follows"], coupling["offset"]) == ({"panda_finger_joint1": -2.0}, 0.1)
+    fixed = [replace(joint, type="fixed") if joint.name == "panda_finger_joint1" else joint for joint in robot.joints]
+    alone = imported(replace(robot, joints=tuple(fixed)), FOLDER / "panda.urdf", tmp_path, {})
+    assert any("'panda_finger_joint2'" in text and "moves alone" in text for text in alone.told)
+
+
 def test_what_is_not_used_is_told(tmp_path: Path) -> None:
-    """Mimic joints by name, drawings by count, joints that carry nothing."""
-    told = read_urdf(FOLDER / "panda.urdf").told
-    assert any("'panda_finger_joint2' should follow 'panda_finger_joint1'" in text for text in told)
+    """Drawings by count, joints that carry nothing."""
     text = """<robot name="r"><link name="a"/>
     <link name="b"><visual/><visual/><inertial><mass value="1"/></inertial></link>
     <link name="c"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>

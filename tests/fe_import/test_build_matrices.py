@@ -161,8 +161,8 @@ def test_solids_with_reference_nodes(tmp_path: Path) -> None:
 
 
 def test_averaged_faces(tmp_path: Path) -> None:
-    """The interface node of an averaged face is in its middle and passes rigid-body motion on exactly."""
-    averaged = [{"name": n, "face": f, "coupling": "averaged"} for n, f in (("hub", "X0"), ("hand", "X1"))]
+    """The interface node of an averaged face, named in any case, is in its middle and passes rigid motion on exactly."""
+    averaged = [{"name": n, "face": f, "coupling": "averaged"} for n, f in (("hub", "x0"), ("hand", "X1"))]
     model = build_model(written(tmp_path, {**MARKET, "interfaces": averaged}))
     assert [i.coupling for i in model.interface_nodes] == ["averaged", "averaged"]
     np.testing.assert_allclose(model.interface_nodes[0].weights.sum(), 1.0, rtol=1e-14)

@@ -297,7 +297,7 @@ def test_units_of_a_solid(tmp_path: Path, units: dict[str, str], length: float, 
 
 
 def test_regions_of_a_solid(tmp_path: Path) -> None:
-    """Element sets with materials of their own: mass of each part, closed form."""
+    """Element sets, named in any case, with materials of their own: mass of each part, closed form."""
     write_box(tmp_path / "box.inp")
     text = (tmp_path / "box.inp").read_text(encoding="utf-8")
     sets = "*ELSET, ELSET=near\n1,\n*ELSET, ELSET=far\n2, 3\n"
@@ -305,7 +305,7 @@ def test_regions_of_a_solid(tmp_path: Path) -> None:
     data = {
         **SOLID,
         "materials": {**SOLID["materials"], "n": {"youngs_modulus": 2e11, "poissons_ratio": 0.3, "density": 7800.0}},
-        "solid": {"mesh": "box.inp", "regions": [{"set": "near", "material": "n"}, {"set": "far", "material": "m"}]},
+        "solid": {"mesh": "box.inp", "regions": [{"set": "NEAR", "material": "n"}, {"set": "far", "material": "m"}]},
     }
     model = build_model(load_link(write_toml(tmp_path / "link.toml", data)))
     found, volume = properties(model), 0.02 * 0.03

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 from pathlib import Path
+from typing import Any
 
 import meshio
 import numpy as np
@@ -14,6 +15,7 @@ from solid_meshes import box, side
 from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.elements.solid_mesh import SolidMesh
 from fe_import.errors import Cause, FEImportError
+from fe_import.files.toml import as_spelt
 from fe_import.mesh.read import read_mesh
 from fe_import.models.model import build_model
 from fe_import.reduce import reduce_link
@@ -405,3 +407,14 @@ def test_a_lost_set_of_a_region(tmp_path):
     with pytest.raises(FEImportError, match="'SOFT' of the mesh is not usable: it needs set 'NOWHERE'") as caught:
         build_model(link)
     assert caught.value.where.endswith("solid.regions[0].set")
+
+
+def test_names_of_sets_go_without_regard_to_case(tmp_path):
+    """Of faces, regions and what is recovered, where one set alone is meant; two that differ in case keep apart."""
+    asked = [{"name": "hub", "face": "X0"}, {"name": "hand", "face": "X1"}]
+    changes: tuple[dict[str, Any], ...] = ({"interfaces": asked, "recovery": {"sets": ["X1"]}}, {})
+    one, other = (reduce_link(solid_link(tmp_path, **each)) for each in changes)
+    np.testing.assert_array_equal(one.frequencies_hz, other.frequencies_hz)
+    assert as_spelt("BODY", {"Body": 1, "x0": 2}) == "Body"
+    assert as_spelt("body", {"Body": 1, "BODY": 2}) == "body"
+    assert as_spelt("BODY", {"Body": 1, "BODY": 2}) == "BODY"

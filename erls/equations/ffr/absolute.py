@@ -169,7 +169,8 @@ def pack_absolute(given: Given, metres: Array) -> CompiledLoops:
     )
     row_metres = np.where(rows.turns, reach, 1.0)
     every = np.arange(len(rows.names))
-    return compile_loops(Tied(_Floating(links), rows, every, metres, row_metres, reach, 0.0, np.inf, turns, feeding))
+    tied = Tied(_Floating(links), rows, every, metres, row_metres, reach, 0.0, np.inf, turns, feeding=feeding)
+    return compile_loops(tied)
 
 
 def stepped(system: CompiledLoops, pack: Any, unpack: Any) -> Stepped:

@@ -82,6 +82,8 @@ class ClosedChain(Tied):
     @cached_property
     def kept(self) -> IntArray:
         """(r,) rows that do not follow from others, at the start."""
+        if not self.rows.names:
+            return np.zeros(0, dtype=np.int64)
         matrix = self.scaled_rows(self.closure(0.0, self.start.y, np.zeros(self.size)), np.arange(len(self.rows.names)))
         _, factor, order = la.qr(matrix.T, mode="economic", pivoting=True)
         sizes = np.abs(np.diag(factor))
@@ -126,9 +128,9 @@ class ClosedChain(Tied):
             LOOP_OPEN, naming loop and direction.
         """
         gaps = np.abs(self.openings(found))
-        worst = int(np.argmax(gaps))
-        if not gaps[worst] > OPEN * self.reach:
+        if not gaps.max(initial=0.0) > OPEN * self.reach:
             return
+        worst = int(np.argmax(gaps))
         limit = OPEN * self.reach
         raise comes_apart(t, self.rows.names[worst], float(gaps[worst]), limit, worst not in self.kept)
 
@@ -429,7 +431,7 @@ class ClosedChain(Tied):
 
     def describe(self) -> dict[str, Any]:
         """Names and sizes for reports."""
-        names = {loop.name: f"loop {loop.name!r}, " for loop in self.mechanism.loops}
+        names = {loop.name: f"{loop.kind} {loop.name!r}, " for loop in self.mechanism.loops}
         loops = [
             {"name": name, "redundant": [r.removeprefix(start) for r in self.redundant if r.startswith(start)]}
             for name, start in names.items()

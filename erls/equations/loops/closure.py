@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import Array, IntArray
+from erls.equations.loops.coupled import couple
 from erls.equations.loops.records import (
     CLOSING_JOINT,
     CLOSURE,
@@ -201,7 +202,7 @@ def _act(
     """Coordinate of a closing joint, and what acts along it."""
     pose, found = state.pose, state.effort
     value = pose[11]
-    if joint.along == 5:
+    if joint.along == 5 and len(joint.factors) == 0:
         angle = angle_of(pose[3] - pose[1], pose[0] + pose[4])
         turned = pose[11] / joint.pitch if joint.pitch.real != 0.0 else _turned(loops, reals, integers, joint, t, y)
         value = angle + 2 * np.pi * np.floor((turned - angle).real / (2 * np.pi) + 0.5)
@@ -218,11 +219,15 @@ def _act(
 
 @part
 def _close(
-    loops: Loops, room: LoopRoom, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, y: Array
-) -> None:
+    loops: Loops, room: LoopRoom, reals: Array, integers: IntArray, scratch: Array, number: int, t: float, y: Array,
+    v: Array,
+) -> None:  # fmt: skip
     joint = read_closing_joint(reals, integers, loops.first + number * CLOSING_JOINT)
     state = read_loop_state(scratch, integers, loops.states + number * LOOP_STATE)
-    _between(joint, room.frames, state)
+    if len(joint.factors) > 0:
+        couple(loops, reals, integers, scratch, joint, t, y, v, state)
+    else:
+        _between(joint, room.frames, state)
     _less_prescribed(reals, integers, joint, t, state)
     for k in range(len(joint.lines)):
         at, gradient = joint.first + k, state.gradients[k]
@@ -248,4 +253,4 @@ def closure(reals: Array, integers: IntArray, scratch: Array, t: float, y: Array
     call_frames(loops.frames, reals, integers, scratch, t, y, v, room.frames)
     still_frames(room.held, room.frames)
     for number in range(loops.loops):
-        _close(loops, room, reals, integers, scratch, number, t, y)
+        _close(loops, room, reals, integers, scratch, number, t, y, v)

@@ -21,6 +21,7 @@ from erls.maths.calls import address_of
 from erls.maths.records import Memory, place_of, python_reader
 from erls.maths.se3 import pose
 from erls.maths.so3 import Array
+from erls.mechanism.couplings import Term
 from erls.mechanism.curves import Curve
 from erls.mechanism.loops import Loop, loop_ends
 from fe_import.model import IntArray
@@ -92,6 +93,8 @@ class Given:
     open : float
         What a loop that has come apart is open by [m].
     turns : Turns
+    joints : tuple of str
+        Names of those of the tree.
     feeding : tuple of int
         Places of the `erls.equations.serial.records.JointState` whose feed-forward acts in each closing joint, where
         any does.
@@ -108,6 +111,7 @@ class Given:
     decay: float
     open: float
     turns: Turns
+    joints: tuple[str, ...] = ()
     feeding: tuple[int, ...] = ()
     grips: tuple[tuple[int, Array], ...] = ()
 
@@ -366,7 +370,7 @@ def _joint(memory: Memory, given: Given, number: int, loop: Loop) -> own.Closing
     return own.ClosingJoint(
         outer=places[0],
         inner=places[1],
-        first=int(np.flatnonzero(given.rows.owner == number)[0]),
+        first=int(np.count_nonzero(given.rows.owner < number)),
         motion=-1 if free is None or not loop.prescribed else put_curve(memory, free.drive.motion),
         along=-1 if free is None else free.freedom.row,
         joint=joint,
@@ -376,8 +380,32 @@ def _joint(memory: Memory, given: Given, number: int, loop: Loop) -> own.Closing
         turned=float(given.turns.start[number]),
         signs=given.turns.signs[number],
         ground=np.stack([pose_numbers(end.frame) for end in ends]),
-        lines=np.array([row.line for row in found]),
-        entries=np.array([row.entries for row in found]),
+        lines=np.array([row.line for row in found]).reshape(-1, 3),
+        entries=np.array([row.entries for row in found]).reshape(-1, 3, 3),
         pitches=np.array([row.pitch for row in found]),
         grip=np.zeros(0) if free is None else free.grip(given.reach),
+        offset=0.0 if loop.coupling is None else loop.coupling.offset,
+        factors=np.array([term.factor for term in _terms(loop)]),
+        **_coordinates(memory, given, loop),
     )
+
+
+def _terms(loop: Loop) -> tuple[Term, ...]:
+    return () if loop.coupling is None else loop.coupling.terms
+
+
+def _coordinates(memory: Memory, given: Given, loop: Loop) -> dict[str, IntArray]:
+    """Where a coupling finds the coordinates that it ties; curves of those that are prescribed are put into memory."""
+    columns, curves, others = list[int](), list[int](), list[int]()
+    closing, turns = [other.name for other in given.rows.loops], given.turns
+    prescribed = [k for k, motion in enumerate(turns.motions) if motion is not None]
+    for term in _terms(loop):
+        tree = given.joints.index(term.joint) if term.joint in given.joints else -1
+        others.append(closing.index(term.joint) if tree < 0 else -1)
+        curves.append(put_curve(memory, turns.motions[tree]) if tree in prescribed else -1)
+        own = int(turns.places[tree]) if tree >= 0 else -1
+        columns.append(given.tree.size + prescribed.index(tree) if tree in prescribed else own)
+    return {
+        name: np.array(found, dtype=np.int64)
+        for name, found in (("columns", columns), ("curves", curves), ("others", others))
+    }

@@ -124,6 +124,13 @@ class ClosingJoint(NamedTuple):
         is prescribed.
     grip : (9,) array
         Friction along it that may stick, as in `erls.maths.contact_law`; empty without.
+    offset : float
+        Of a coupling: of the coordinate that follows.
+    factors : (f,) array
+        Of a coupling what it changes by per unit of each coordinate; empty of a joint.
+    columns, curves, others : (f,) int arrays
+        Place of each coordinate among velocities and prescribed rates; of its curve, -1 unless it is prescribed; number
+        of the closing joint whose coordinate it is, -1 of joints of the tree.
     """
 
     outer: int
@@ -142,6 +149,11 @@ class ClosingJoint(NamedTuple):
     entries: Stack
     pitches: Vector
     grip: Vector
+    offset: float
+    factors: Vector
+    columns: Indices
+    curves: Indices
+    others: Indices
 
 
 class GrippedJoint(NamedTuple):

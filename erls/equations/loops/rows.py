@@ -89,9 +89,11 @@ class LoopRows:
         kinds = [JOINT_TYPES["fixed"] if loop.prescribed else loop.type for loop in loops]  # no turn is left
         self._aligned = [kind.aligned for kind in kinds]
         pairs = [(k, row) for k, found in enumerate(self.conditions) for row in found]
-        self.names = tuple(f"loop {loops[k].name!r}, {row.name}" for k, row in pairs)
-        self.turns = np.array([not row.line.any() for _, row in pairs], dtype=bool)
-        self.owner = np.array([k for k, _ in pairs])
+        self.names = tuple(f"{loops[k].kind} {loops[k].name!r}, {row.name}" for k, row in pairs)
+        tied = [None if loop.coupling is None else loop.coupling.turns for loop in loops]
+        angles = [not row.line.any() if tied[k] is None else tied[k] for k, row in pairs]
+        self.turns = np.array(angles, dtype=bool)
+        self.owner = np.array([k for k, _ in pairs], dtype=np.int64)
         self._ends = np.cumsum([len(found) for found in self.conditions])
 
     def wrenches(self, found: Closure, multipliers: Array) -> list[Array]:

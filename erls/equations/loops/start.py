@@ -59,6 +59,8 @@ def find_start(chain: Tied) -> Start:
     given = np.zeros(chain.size)
     given[:count] = [chain.mechanism.joints[k].position for k in chain.bare.free_joints]
     every = np.arange(count)
+    if not chain.rows.names:  # elastic couplings tie nothing
+        return Start(given, every, np.zeros(0, dtype=np.int64))
     best = Start(given, every, every, np.inf)
     for some in (True, False):
         for nudge in _NUDGES:
@@ -107,6 +109,8 @@ def start_velocity(chain: Tied, y: Array, following: IntArray) -> Array:
     v = np.zeros(chain.size)
     joints = chain.bare.free_joints
     v[: len(joints)] = [chain.mechanism.joints[k].rate for k in joints]
+    if not len(following):
+        return v
     found = chain.closure(0.0, y, v)
     rows = _joint_rows(chain, y)[:, following]
     v[following] -= np.linalg.lstsq(rows, chain.row_metres * found.rate, rcond=_DEPENDENT)[0] / chain.metres[following]

@@ -70,7 +70,8 @@ class Tied:
             [None if k in free else joint.drive.motion for k, joint in enumerate(joints)],
         )
         numbers = self.reach, decay, OPEN * self.reach
-        given = Given(self.bare, self.rows, kept, self.metres, self.row_metres, *numbers, turns)
+        names = tuple(joint.name for joint in joints)
+        given = Given(self.bare, self.rows, kept, self.metres, self.row_metres, *numbers, turns, names)
         held = [(at, joints[k]) for at, k in enumerate(free) if self.mechanism.gripped and joints[k].forces.sticks]
         grips = tuple((at, joint.forces.grip(joint.freedom, self.reach)) for at, joint in held)
         return compile_loops(replace(given, grips=grips))

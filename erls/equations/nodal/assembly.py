@@ -10,9 +10,10 @@ import numpy as np
 
 from erls.equations.nodal.contract import Model, Work
 from erls.equations.nodal.elements import Elements
+from erls.equations.nodal.elimination import Elimination, elimination
 from erls.equations.nodal.joints import Joint, JointRows
 from erls.equations.nodal.layout import Flat, Functions, lay_out, used_kinds
-from erls.equations.nodal.model import Kinds, band_order, build_model
+from erls.equations.nodal.model import Kinds, build_model
 from erls.equations.nodal.nodes import Nodes, numbers_of, poses_of, rows_of
 from erls.equations.nodal.scatter import Scatter, dofs
 from erls.equations.system import metre_scales
@@ -89,10 +90,11 @@ class NodalSystem:
         windings = sum(len(s.nodes) for s in self.kinds.windings)
         built = Nodes(poses, self.kinds.beams.built, coordinates, np.zeros((windings, 3)))
         self.start = built  # `length_scales` asks for it
-        order, self.width = band_order(self.count, pairs, self.rows)
-        model = build_model(self.kinds, self.rows, self.local, metre_scales(self), order)
+        heavy = len(self.kinds.heavy) == self.count
+        self.elimination: Elimination = elimination(self.count, pairs, self.rows, heavy)
+        model = build_model(self.kinds, self.rows, self.local, metre_scales(self), self.elimination)
         self._functions = functions(*used_kinds(model))
-        self.flat: Flat = lay_out(model, built, self.samples(np.zeros(1)).shape[1], self.width, self._functions)
+        self.flat: Flat = lay_out(model, built, self.samples(np.zeros(1)).shape[1], self.elimination, self._functions)
         self._memory = self.flat.reals, self.flat.integers, self.flat.scratch
         self.model: Model = self.flat.model()
         self._work: Work = self.flat.work()

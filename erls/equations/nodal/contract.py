@@ -62,7 +62,9 @@ class Model(NamedTuple):
         conditions, (m, 12) c, C, (m,) of threads, 0 of conditions that are linear;
         (m,) 1 of conditions that are out of use for a while.
     metres, place, order : arrays
-        (n,) metres per unit; (N,) number of each unknown in the band, and the unknown of each number.
+        (n,) metres per unit; (N,) number of each unknown in the elimination, and the unknown of each number.
+    band, fronts, front_of, later, into : int, arrays
+        Width of the band of the iteration matrix; where that is -1 its fronts, as of `erls.maths.front_plan`.
     """
 
     local: int
@@ -108,6 +110,11 @@ class Model(NamedTuple):
     metres: Vector
     place: Indices
     order: Indices
+    band: int
+    fronts: Pairs
+    front_of: Indices
+    later: Indices
+    into: Indices
 
 
 class State(NamedTuple):
@@ -179,7 +186,7 @@ class Work(NamedTuple):
 
 
 class Factors(NamedTuple):
-    """The factored iteration matrix; N unknowns in a band of width w.
+    """The factored iteration matrix of N unknowns.
 
     Attributes
     ----------
@@ -187,8 +194,8 @@ class Factors(NamedTuple):
         Metres per unit of β λ, and of Φ, of each condition.
     left, right, ordered : (N,) arrays
         Scales of equations and of unknowns, and memory.
-    band, pivots : arrays
-        (N, 3 w + 1) row by row, (N,).
+    entries, stack, pivots : arrays
+        A band of width w, (N, 3 w + 1) row by row, or fronts, and Schur complements between these; (N,).
     """
 
     force: Vector
@@ -196,7 +203,8 @@ class Factors(NamedTuple):
     left: Vector
     right: Vector
     ordered: Vector
-    band: Matrix
+    entries: Vector
+    stack: Vector
     pivots: Vector
 
 

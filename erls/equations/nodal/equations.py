@@ -7,9 +7,10 @@ integrator found with them: the rates of the nodes' twists and the multipliers.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -27,11 +28,12 @@ from erls.equations.nodal.link_state import LinkView
 from erls.equations.nodal.locks import LockedSystem, dry_joints
 from erls.equations.nodal.neighbours import NodalNeighbours, names_of_nodes, nodal_neighbours
 from erls.equations.nodal.nodes import Nodes
-from erls.equations.nodal.parts import BeamRules, link_parts
+from erls.equations.nodal.parts import BeamRules, LinkParts, link_parts
 from erls.equations.nodal.redundant import smallest_multipliers
 from erls.equations.nodal.resting import Resting, resting
 from erls.equations.nodal.scatter import IntArray
 from erls.equations.nodal.seat import Seat
+from erls.equations.nodal.shell_stress import link_stress
 from erls.equations.nodal.spinning import SpinningNeighbours, spinning_neighbours
 from erls.equations.nodal.start import carried_along
 from erls.equations.serial.equilibrium import size_of
@@ -60,6 +62,8 @@ class Nodal:
         So many elements in place of each.
     rules : BeamRules
         How beams become elements.
+    known : sequence of LinkParts or None
+        Of the links, as far as they are made already.
 
     Raises
     ------
@@ -74,10 +78,16 @@ class Nodal:
         start: ClosedStart | None = None,
         times: int = 1,
         rules: BeamRules = BeamRules(),  # noqa: B008  (frozen)
+        known: Sequence[LinkParts | None] = (),
     ) -> None:
         self.mechanism, self._elements, self._start, self._rules = mechanism, elements_per_member, start, rules
-        parts = [link_parts(link, elements_per_member, times, rules) for link in mechanism.links]
+        parts = [
+            made or link_parts(link, elements_per_member, times, rules)
+            for made, link in zip_longest(known, mechanism.links)
+        ]
+        self._parts, self._times = parts, times
         self._built = [part.nodes for part in parts]  # in the mesh frames
+        self._stressed = [link_stress(part, link.model) for part, link in zip(parts, mechanism.links, strict=True)]
         self.chain: Chain = build_chain(mechanism, parts, start)
         self.system = self.chain.system
         self.views = [
@@ -93,6 +103,13 @@ class Nodal:
         free = [k for k, loop in enumerate(mechanism.loops) if loop.freedom is not None]
         self._moving = {k: len(mechanism.joints) + n for n, k in enumerate(free)}  # numbers of actuators of loops
 
+    def surface_stress(self, link: int, y: Array, v: Array) -> Array | None:
+        """See `erls.equations.formulation.SurfaceStressed`."""
+        where, own = self._stressed[link], self.chain.nodes[link]
+        if where is None:
+            return None
+        return np.array([where.at(self.configuration(*state)[0].poses[own]) for state in zip(y, v, strict=True)])
+
     def refined(self, times: int) -> Nodal:
         """The same with so many elements in place of each."""
         return Nodal(self.mechanism, self._elements, self._start, times, self._rules)
@@ -101,7 +118,9 @@ class Nodal:
         """The same of a mechanism whose links have other sections or materials, and nodes and interfaces where they are
         here: loops begin as they do here.
         """
-        return Nodal(mechanism, self._elements, self._start, rules=self._rules)
+        pairs = zip(mechanism.links, self.mechanism.links, self._parts, strict=True)
+        known = [part if link is own and self._times == 1 else None for link, own, part in pairs]
+        return Nodal(mechanism, self._elements, self._start, rules=self._rules, known=known)
 
     @cached_property
     def _arms(self) -> list[tuple[int, int, Array]]:

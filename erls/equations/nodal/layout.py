@@ -10,6 +10,7 @@ import numpy as np
 
 from erls.equations.nodal import contract
 from erls.equations.nodal.contract import Before, Layout, Model, State, Work
+from erls.equations.nodal.elimination import Elimination
 from erls.equations.nodal.model import factor_room, room
 from erls.equations.nodal.nodes import Nodes, numbers_of, rows_of
 from erls.maths.calls import address_for, address_of
@@ -66,7 +67,7 @@ def used_kinds(model: Model) -> list[str]:
     return [name for name, count in has.items() if count]
 
 
-def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Functions) -> Flat:
+def lay_out(model: Model, start: Nodes, samples: int, own: Elimination, functions: Functions) -> Flat:
     """Put a system into flat memory.
 
     Parameters
@@ -76,8 +77,8 @@ def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Fun
         A configuration.
     samples : int
         Numbers that depend on time alone.
-    width : int
-        Of the band, from `erls.equations.nodal.model.band_order`.
+    own : Elimination
+        Of the iteration matrix.
     functions : Functions
         What is called by address.
     """
@@ -89,7 +90,7 @@ def lay_out(model: Model, start: Nodes, samples: int, width: int, functions: Fun
         work=scratch.put(room(model)),
         before=scratch.put(Before(numbers_of(start), np.zeros(1))),
         state=Memory(integers).put(state),
-        factors=factors.put(factor_room(model, width)),
+        factors=factors.put(factor_room(model, own)),
         forces=address_of(functions.forces, contract.FORCES),
         remember=address_of(functions.remember, contract.REMEMBER),
         knot=address_of(functions.knot, contract.KNOT),

@@ -1,5 +1,7 @@
-"""The scaled iteration matrix of a nodal system as a band, with the scales of `erls.maths.saddle`; functions of
-`erls.equations.stepped`.
+"""The scaled iteration matrix of a nodal system as a band or in fronts, with the scales of `erls.maths.saddle`;
+functions of `erls.equations.stepped`.
+
+Either way entries of a few neighbouring rows and columns lie in rows at equal distances: `_spot` tells where.
 """
 
 from __future__ import annotations
@@ -7,6 +9,7 @@ from __future__ import annotations
 from erls.equations import compiled_system as contract
 from erls.equations.compiled_system import Array, IntArray
 from erls.equations.nodal.contract import (
+    Factors,
     Model,
     Work,
     call_blocks,
@@ -16,45 +19,53 @@ from erls.equations.nodal.contract import (
     read_model,
     read_work,
 )
-from erls.maths import band
+from erls.maths import band, fronts
 from erls.maths.jit import kernel, part
 from erls.maths.vectors import Rotation, nine, times
+from erls.maths.views import matrix_at
 
 _ONE = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 @part
-def _enter(band: Array, place: IntArray, row: int, column: int, entry: float) -> None:
-    width = (band.shape[1] - 1) // 3
-    band[place[row], place[column] - place[row] + width] += entry
+def _spot(model: Model, row: int, column: int) -> tuple[int, int]:
+    """Where the entry of two unknowns lies, and the distance to the same column of the next row."""
+    i, j, width = model.place[row], model.place[column], model.band
+    if width < 0:
+        at, apart = fronts.spot(model.fronts, model.later, model.front_of, i, j)
+        return at, apart
+    return int(i * (3 * width + 1) + j - i + width), int(3 * width)
 
 
 @part
-def _add_element(band: Array, place: IntArray, pairs: IntArray, e: int, whole: Array) -> None:
+def _add_element(entries: Array, model: Model, e: int, whole: Array) -> None:
     """Enter the weighted sum of element e between two nodes, of which the ground has no share."""
     for side in range(2):
         for other in range(2):
-            row, column = 6 * pairs[e, side], 6 * pairs[e, other]
+            row, column = 6 * model.pairs[e, side], 6 * model.pairs[e, other]
             if row < 0 or column < 0:
                 continue
+            at, apart = _spot(model, row, column)
             for i in range(6):
                 for j in range(6):
-                    _enter(band, place, row + i, column + j, whole[6 * side + i, 6 * other + j])
+                    entries[at + i * apart + j] += whole[6 * side + i, 6 * other + j]
 
 
 @part
 def _add_condition(
-    band: Array, place: IntArray, column: int, at: int, turn: Rotation, gradient: Array, of_q: Array, beta: float
+    entries: Array, model: Model, column: int, at: int, turn: Rotation, gradient: Array, of_q: Array, beta: float
 ) -> None:
     """A node's share, its velocities from ``at`` on, of row B T and column Bᵀ of a condition; ``of_q`` is β T."""
     linear = times(turn, (gradient[0], gradient[1], gradient[2]))
+    down, apart = _spot(model, at, column)
+    along, _ = _spot(model, column, at)
     for i in range(6):
         entry = linear[i] if i < 3 else gradient[i]
-        _enter(band, place, at + i, column, entry)
+        entries[down + i * apart] += entry
         total = 0.0 * entry
         for k in range(6):
             total += gradient[k] * of_q[k, i]
-        _enter(band, place, column, at + i, total / beta)
+        entries[along + i] += total / beta
 
 
 @part
@@ -68,8 +79,8 @@ def _largest(turn: Rotation, gradient: Array, metres: Array, at: int) -> float:
 
 
 @part
-def _scale(band: Array, order: IntArray, inertia: Array, metres: Array, left: Array, right: Array) -> None:
-    """Units of `erls.maths.saddle`: metres, and newtons per mass."""
+def _units(inertia: Array, metres: Array, left: Array, right: Array) -> None:
+    """Of `erls.maths.saddle`: metres, and newtons per mass."""
     n = len(metres)
     mass = 0.0
     for i in range(n):
@@ -77,24 +88,42 @@ def _scale(band: Array, order: IntArray, inertia: Array, metres: Array, left: Ar
     force = 1.0 / (mass if mass > 0.0 else 1.0)
     for i in range(n):
         left[i], right[i] = force / metres[i], 1.0 / metres[i]
-    for i in range(n, len(order)):
+    for i in range(n, len(left)):
         right[i] = left[i] / force
-    width, size = (band.shape[1] - 1) // 3, len(band)
-    for i in range(size):
-        scale = left[order[i]]
-        for j in range(max(0, i - width), min(size, i + width + 1)):
-            band[i, j - i + width] *= scale * right[order[j]]
 
 
 @part
-def _add_joints(model: Model, work: Work, beta: float, table: Array, left: Array) -> None:
+def _scale(entries: Array, model: Model, left: Array, right: Array) -> None:
+    order, width, size = model.order, model.band, len(model.order)
+    if width < 0:
+        for f in range(len(model.fronts)):
+            fronts.scale(entries, model.fronts, model.later, f, order, left, right)
+        return
+    table = matrix_at(entries, 0, size, 3 * width + 1)
+    for i in range(size):
+        scale = left[order[i]]
+        for j in range(max(0, i - width), min(size, i + width + 1)):
+            table[i, j - i + width] *= scale * right[order[j]]
+
+
+@part
+def _factor(model: Model, room: Factors) -> int:
+    if model.band < 0:
+        found = fronts.factor(room.entries, model.fronts, model.into, room.stack, room.pivots)
+    else:
+        found = band.factor(matrix_at(room.entries, 0, len(model.order), 3 * model.band + 1), room.pivots)
+    return int(found)
+
+
+@part
+def _add_joints(model: Model, work: Work, beta: float, entries: Array, left: Array) -> None:
     """Rows and columns of all conditions, and their scales."""
     n = len(work.force)
     for j in range(len(model.joint_nodes)):
         for row in range(model.joint_rows[j], model.joint_rows[j + 1]):
             size = 0.0
             if model.released[row].real != 0.0:  # its multiplier does not change
-                _enter(table, model.place, n + row, n + row, 1.0)
+                entries[_spot(model, n + row, n + row)[0]] += 1.0
             for side in range(2):
                 node = model.joint_nodes[j, side]
                 if node < 0:
@@ -103,8 +132,7 @@ def _add_joints(model: Model, work: Work, beta: float, table: Array, left: Array
                 if not model.local:
                     turn = nine(work.poses, node, 3)
                 size = max(size, _largest(turn, gradient, model.metres, 6 * node))
-                of_q, place = work.factors[node, 2], model.place
-                _add_condition(table, place, n + row, 6 * node, turn, gradient, of_q, beta)
+                _add_condition(entries, model, n + row, 6 * node, turn, gradient, work.factors[node, 2], beta)
             # so that the largest derivative by a displacement is one
             left[n + row] = 1.0 / size if size > 0.0 else 1.0
 
@@ -115,15 +143,14 @@ def factored(reals: Array, integers: IntArray, scratch: Array, alpha: float, bet
     own = read_layout(reals, integers, integers[len(integers) - 1])
     model, work = read_model(reals, integers, own.model), read_work(scratch, integers, own.work)
     room = read_factors(factors, integers, own.factors)
-    table, n = room.band, len(work.force)
-    for i in range(table.shape[0]):
-        for j in range(table.shape[1]):
-            table[i, j] = 0.0
+    n = len(work.force)
+    for i in range(len(room.entries)):
+        room.entries[i] = 0.0
     for i in range(n):
         work.inertia[i] = 0.0
     call_weighted(own.weighted, reals, integers, scratch, 1.0, alpha, beta)
     for e in range(len(model.pairs)):
-        _add_element(table, model.place, model.pairs, e, work.whole[e])
+        _add_element(room.entries, model, e, work.whole[e])
         for side in range(2):
             node = model.pairs[e, side]
             if node >= 0:
@@ -131,14 +158,16 @@ def factored(reals: Array, integers: IntArray, scratch: Array, alpha: float, bet
                     work.inertia[6 * node + i] += work.blocks[e, 0, 6 * side + i, 6 * side + i]
     if not model.local:
         for node in range(len(work.poses)):
+            at, apart = _spot(model, 6 * node, 6 * node + 3)
             for i in range(3):
                 for j in range(3):
-                    _enter(table, model.place, 6 * node + i, 6 * node + 3 + j, work.turning[node, i, j])
-    _add_joints(model, work, beta, table, room.left)
-    _scale(table, model.order, work.inertia, model.metres, room.left, room.right)
+                    room.entries[at + i * apart + j] += work.turning[node, i, j]
+    _add_joints(model, work, beta, room.entries, room.left)
+    _units(work.inertia, model.metres, room.left, room.right)
+    _scale(room.entries, model, room.left, room.right)
     for k in range(len(room.gap)):
         room.force[k], room.gap[k] = 1.0 / room.right[n + k], room.left[n + k]
-    found = band.factor(table, room.pivots)
+    found = _factor(model, room)
     if found == 0:
         return 0
     for i in range(len(model.place)):
@@ -169,10 +198,13 @@ def factor(
 def solve(reals: Array, integers: IntArray, factors: Array, b: Array) -> None:
     """Replace [b; Φ] by [x; β λ]."""
     own = read_layout(reals, integers, integers[len(integers) - 1])
-    order = read_model(reals, integers, own.model).order
-    room = read_factors(factors, integers, own.factors)
+    model, room = read_model(reals, integers, own.model), read_factors(factors, integers, own.factors)
+    order = model.order
     for i in range(len(order)):
         room.ordered[i] = room.left[order[i]] * b[order[i]]
-    band.solve(room.band, room.pivots, room.ordered)
+    if model.band < 0:
+        fronts.solve(room.entries, model.fronts, model.later, room.pivots, room.ordered)
+    else:
+        band.solve(matrix_at(room.entries, 0, len(order), 3 * model.band + 1), room.pivots, room.ordered)
     for i in range(len(order)):
         b[order[i]] = room.right[order[i]] * room.ordered[i]

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from typing import Any, TypeVar
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import reverse_cuthill_mckee
 
 from erls.equations.nodal.actuators import Actuators
 from erls.equations.nodal.beam import Beams
 from erls.equations.nodal.contacts import Contacts
 from erls.equations.nodal.contract import Factors, Model, Work
 from erls.equations.nodal.elements import Elements
+from erls.equations.nodal.elimination import Elimination
 from erls.equations.nodal.joints import JointRows
 from erls.equations.nodal.loads import NodalLoads
 from erls.equations.nodal.nodes import rows_of
@@ -50,8 +49,14 @@ class Kinds:
         sets: list[Elements] = [self.beams, self.bodies, self.loads, *self.actuators, self.contacts, self.shells]
         return np.concatenate([_pairs(e.nodes) for e in [*sets, *self.springs, *self.windings]])
 
+    @property
+    def heavy(self) -> IntArray:
+        """Nodes that resist every acceleration, with stiffness at least."""
+        of_bodies = self.bodies.nodes[:, 0][np.linalg.eigvalsh(self.bodies.matrices)[:, 0] > 0]
+        return np.unique(np.concatenate([of_bodies, self.beams.nodes[self.beams.moving > 0].ravel()]))
 
-def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, places: IntArray) -> Model:
+
+def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, own: Elimination) -> Model:
     """All constants.
 
     Parameters
@@ -62,8 +67,7 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         SE(3), or R³×SO(3).
     metres : (n,) array
         Per unit of each velocity.
-    places : (N,) array
-        Of all unknowns in the band, from `band_order`.
+    own : Elimination
     """
     beams, bodies, loads, actuators = kinds.beams, kinds.bodies, kinds.loads, kinds.actuators
     frames = [_frames(a.inner_frames, a.outer_frames) for a in actuators]
@@ -109,8 +113,13 @@ def build_model(kinds: Kinds, rows: JointRows, local: bool, metres: Array, place
         pitches=rows.pitches,
         released=np.zeros(len(rows.names)),
         metres=metres,
-        place=places,
-        order=np.argsort(places).astype(np.int64),
+        place=own.place,
+        order=np.argsort(own.place).astype(np.int64),
+        band=own.width,
+        fronts=own.fronts,
+        front_of=own.front_of,
+        later=own.later,
+        into=own.into,
     )
 
 
@@ -137,35 +146,11 @@ def room(model: Model) -> Work:
     return Work(**{name: np.zeros(shape) for name, shape in shapes.items()})
 
 
-def factor_room(model: Model, width: int) -> Factors:
-    """Memory for a factored iteration matrix in a band of this width."""
+def factor_room(model: Model, own: Elimination) -> Factors:
+    """Memory for a factored iteration matrix."""
     m, unknowns = len(model.conditions), len(model.place)
-    of_rows, per_condition = (unknowns,), (m,)
-    shapes = per_condition, per_condition, of_rows, of_rows, of_rows, (unknowns, 3 * width + 1), of_rows
-    return Factors(*map(np.zeros, shapes))
-
-
-def band_order(count: int, pairs: IntArray, rows: JointRows) -> tuple[IntArray, int]:
-    """Numbers of all unknowns in the band, nodes and joints by the reverse Cuthill-McKee order; width of the band.
-
-    E. Cuthill, J. McKee, Proc. 24th Nat. Conf. ACM (1969) 157–172.
-    """
-    joints = len(rows.joints)
-    groups = [pair[pair >= 0] for pair in pairs]
-    groups += [np.append(pair[pair >= 0], count + k) for k, pair in enumerate(rows.nodes)]
-    along = np.concatenate([np.zeros(0, dtype=np.int64), *(np.repeat(g, len(g)) for g in groups)])
-    across = np.concatenate([np.zeros(0, dtype=np.int64), *(np.tile(g, len(g)) for g in groups)])
-    graph = sp.csr_array((np.ones(len(along)), (along, across)), shape=(count + joints, count + joints))
-    of_joints = np.bincount(rows.joint_of_row, minlength=joints)
-    sizes = np.concatenate([np.full(count, 6), of_joints]).astype(np.int64)
-    own = np.concatenate([[0], np.cumsum(sizes)])
-    places = np.zeros(own[-1], dtype=np.int64)
-    last = 0
-    for block in reverse_cuthill_mckee(graph, symmetric_mode=True):
-        places[own[block] : own[block + 1]] = np.arange(last, last + sizes[block])
-        last += sizes[block]
-    spans = [np.concatenate([places[own[b] : own[b + 1]] for b in g]) for g in groups]
-    return places, max((int(np.ptp(s)) for s in spans if len(s)), default=5)
+    sizes = m, m, unknowns, unknowns, unknowns, own.entries, own.stack, unknowns
+    return Factors(*map(np.zeros, sizes))
 
 
 def _all(elements: Sequence[Elements], kind: type[E]) -> list[E]:

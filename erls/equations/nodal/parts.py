@@ -46,6 +46,8 @@ class LinkParts:
         Where the nodes of the modal model lie: beam, and share of its length. Empty for other links.
     shells : list of Shell
         Corners in the mesh frame.
+    corners : (q, 4) int array
+        Which nodes of the mesh these are, as many nodes of the modal model first as there are.
     carriers : (n,) int array
         Of a link of shells the node that each node of the modal model goes with.
     """
@@ -56,6 +58,7 @@ class LinkParts:
     elements: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
     fractions: Array = field(default_factory=lambda: np.zeros(0))
     shells: list[Shell] = field(default_factory=list)
+    corners: IntArray = field(default_factory=lambda: np.zeros((0, 4), dtype=np.int64))
     carriers: IntArray = field(default_factory=lambda: np.zeros(0, dtype=np.int64))
 
 
@@ -101,7 +104,8 @@ def link_parts(link: Link, elements: int | None, times: int, rules: BeamRules = 
         raise refused(what, where, "solid, or reduced elsewhere", remedy)
     frame = link.description.frame
     parts = frame_parts(link.description, frame, where, elements, times)
-    own = frame_parts(link.description, frame, where).mesh
+    same = elements is None and times == 1
+    own = parts.mesh if same else frame_parts(link.description, frame, where).mesh
     places = _places(own, parts.mesh)
     return LinkParts(parts.mesh.nodes, *_beams_and_bodies(link, parts, places, rules), *places)
 

@@ -38,6 +38,8 @@ class Shell:
         ∫ρ dz, ∫ρ z dz, ∫ρ z² dz over the thickness [kg/m², kg/m, kg].
     drilling : float
         Stiffness against drilling, in shares of the membrane's shear stiffness.
+    surfaces : (3, 5, 8) array or None
+        Stress by strains, see `fe_import.elements.laminates.Laminate.surfaces`.
     """
 
     nodes: tuple[int, int, int, int]
@@ -45,6 +47,7 @@ class Shell:
     stiffness: Array
     moments: Array
     drilling: float = 1.0
+    surfaces: Array | None = None
 
 
 class Shells:

@@ -1,6 +1,8 @@
 """Derivatives of the forces of shells, `erls.equations.nodal.shell_forces`, by a complex step of their own source.
 
 The material tangent takes steps of the strains, ∑ Bᵀ C B; the full one steps of the forces, with all that turns.
+Neither strains nor forces, each in its own frame, change where all four nodes move rigidly: that gives what the last
+one's coordinates do from those of the others, and saves a quarter of the steps.
 """
 
 from __future__ import annotations
@@ -13,7 +15,20 @@ from erls.equations.nodal.shell import PAIRS
 from erls.equations.nodal.shell_forces import Frame, Frames, corners, inward, strains_at, wrenches
 from erls.maths.jit import kernel, part
 from erls.maths.motions import transformed
-from erls.maths.vectors import Twist, Vector, cross, nine, plus, scaled, times, unit, vector
+from erls.maths.vectors import (
+    Twist,
+    Vector,
+    back_product,
+    cross,
+    minus,
+    nine,
+    plus,
+    scaled,
+    times,
+    turned,
+    unit,
+    vector,
+)
 
 STEP = 1e-30
 """Complex steps: the square of one is nothing beside any number."""
@@ -49,6 +64,27 @@ def _stepped(model: Model, e: int, frames: Frames, j: int) -> Any:
 
 
 @part
+def _complete(out: Array, count: int, model: Model, work: Work, e: int) -> None:
+    """The last six of 24 columns from the others: any rigid motion of all nodes adds up to nothing."""
+    node = model.shell_nodes[e, 3]
+    for j in range(6):
+        for i in range(count):
+            out[i, 18 + j] = 0.0 * out[i, 0]
+    for k in range(3):
+        other = model.shell_nodes[e, k]
+        back = nine(work.poses, other, 3)
+        turn = back_product(back, nine(work.poses, node, 3))
+        arm = turned(back, minus(vector(work.poses, node, 0), vector(work.poses, other, 0)))
+        for j in range(6):
+            w = times(turn, unit(j - 3))
+            v = plus(times(turn, unit(j)), cross(arm, w))
+            for i in range(count):
+                row = out[i, 6 * k] * v[0] + out[i, 6 * k + 1] * v[1] + out[i, 6 * k + 2] * v[2]
+                row += out[i, 6 * k + 3] * w[0] + out[i, 6 * k + 4] * w[1] + out[i, 6 * k + 5] * w[2]
+                out[i, 18 + j] -= row
+
+
+@part
 def _imaginary(a: Any) -> Vector:
     return a[0].imag / STEP, a[1].imag / STEP, a[2].imag / STEP
 
@@ -57,12 +93,13 @@ def _imaginary(a: Any) -> Vector:
 def _full(model: Model, work: Work, e: int, frames: Frames) -> None:
     """(24, 24) derivatives of the forces on the nodes."""
     out = work.corners
-    for j in range(24):
+    for j in range(18):
         found = wrenches(model, e, _stepped(model, e, frames, j))
         for k in range(4):
             n, m = inward(model, e, k, (_imaginary(found[k][0]), _imaginary(found[k][1])))
             for i in range(3):
                 out[6 * k + i, j], out[6 * k + 3 + i, j] = n[i], m[i]
+    _complete(out, 24, model, work, e)
 
 
 @part
@@ -73,11 +110,12 @@ def _material(model: Model, work: Work, e: int, frames: Frames) -> None:
         for j in range(24):
             out[i, j] = 0.0
     for point in range(4):
-        for j in range(24):
+        for j in range(18):
             x = strains_at(model, e, _stepped(model, e, frames, j), point)
             rows[0, j], rows[1, j], rows[2, j] = x[0].imag / STEP, x[1].imag / STEP, x[2].imag / STEP
             rows[3, j], rows[4, j], rows[5, j] = x[3].imag / STEP, x[4].imag / STEP, x[5].imag / STEP
             rows[6, j], rows[7, j], rows[8, j] = x[6].imag / STEP, x[7].imag / STEP, x[8].imag / STEP
+        _complete(rows, 9, model, work, e)
         for j in range(24):
             for p in range(9):
                 stress = 0.0 * rows[0, j]

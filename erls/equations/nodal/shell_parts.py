@@ -54,7 +54,14 @@ def shell_link_parts(link: Link, shells: LinkShells, times: int) -> LinkParts:
     numbers[used] = np.arange(len(used))
     own = numbers[carriers]
     every = [
-        Shell(tuple(own[cell].tolist()), frame, shells.stiffness[k], shells.moments[k], shells.drilling)
+        Shell(
+            tuple(own[cell].tolist()),
+            frame,
+            shells.stiffness[k],
+            shells.moments[k],
+            shells.drilling,
+            shells.surfaces[k] if len(shells.surfaces) else None,
+        )
         for cell, frame, k in zip(cells, frames, make.tolist(), strict=True)
     ]
     poses = np.array([pose(position=x) for x in places[used]])
@@ -63,9 +70,11 @@ def shell_link_parts(link: Link, shells: LinkShells, times: int) -> LinkParts:
         carrier = carried(own, payload.node, where)
         arm = model.nodes[payload.node] - places[used][carrier]
         bodies.append(RigidBody(carrier, payload.mass, payload.inertia, arm + payload.offset))
+    bending = np.array([len(set(shell.nodes)) > 1 for shell in every])
     return LinkParts(
         nodes=places[used],
-        shells=[shell for shell in every if len(set(shell.nodes)) > 1],
+        shells=[shell for shell, bends in zip(every, bending, strict=True) if bends],
+        corners=cells[bending],
         bodies=joined(bodies),
         carriers=own[: len(model.nodes)],
     )

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.linalg as la
 
-from erls.inverse.nodal.servoed import Forces, Rest
+from erls.inverse.nodal.servoed import Rest
 from erls.inverse.two_point import refuse_change
 from erls.maths.so3 import Array
 
@@ -39,20 +39,20 @@ def bounded(first: Rest, last: Rest, metres: Array, h: float) -> tuple[Bounded, 
     SimulationError
         UNSTABLE_INVERSE: not as much grows at the end as at the start.
     """
-    start, growing = _rows(first.forces, metres, h, True)
-    end, staying = _rows(last.forces, metres, h, False)
-    refuse_change(2 * len(first.forces.mass[0]) - 2 * len(first.held_by) - staying, growing)
+    start, growing = _rows(first, metres, h, True)
+    end, staying = _rows(last, metres, h, False)
+    refuse_change(2 * len(metres) - 2 * len(first.held_by) - staying, growing)
     return start, end
 
 
-def _rows(at: Forces, metres: Array, h: float, growing: bool) -> tuple[Bounded, int]:
+def _rows(at: Rest, metres: Array, h: float, growing: bool) -> tuple[Bounded, int]:
     """That hold the others, and how many roots grow, or do not."""
-    ways, across = (la.null_space(part / metres) for part in (at.rows[0], at.pushed[0].T))
+    ways, across = (la.null_space(part / metres) for part in (at.balance.rows[0], at.balance.pushed[0].T))
     if not ways.shape[1]:
         return Bounded(*np.zeros((2, 0, len(metres)))), 0
     mass, damping, stiffness = (
-        (across / metres[:, None]).T @ part[0] @ (ways / metres[:, None])
-        for part in (at.mass / h**2, at.damping / (2 * h), at.stiffness)
+        (across / metres[:, None]).T @ (part / unit) @ (ways / metres[:, None])
+        for part, unit in zip(at.matrices, (h**2, 2 * h, 1.0), strict=True)
     )
     units = stiffness + 4 * mass  # of the fastest steps: what alternates
     mass, damping, stiffness = (np.linalg.solve(units, part) for part in (mass, damping, stiffness))

@@ -50,8 +50,8 @@ class Held(NamedTuple):
     driven: Array
 
 
-class Forces(NamedTuple):
-    """What is out of balance at k states, and its derivatives.
+class Balance(NamedTuple):
+    """What is out of balance at k states.
 
     Attributes
     ----------
@@ -63,24 +63,31 @@ class Forces(NamedTuple):
         B, then C.
     pushed : (k, n, m + p) array
         Bᵀ, then -Aᵀ.
-    mass, damping, stiffness : (k, n, n) arrays
     """
 
     force: Array
     open: Array
     rows: Array
     pushed: Array
+
+
+class Blocks(NamedTuple):
+    """Derivatives of R + Bᵀ λ at k states, (k, P, 6, 6) each, of nodes by nodes: `NodalServoed.pairs`."""
+
     mass: Array
     damping: Array
     stiffness: Array
 
 
 class Rest(NamedTuple):
-    """An equilibrium: configuration, multipliers of joints and efforts (m + p,), derivatives there."""
+    """An equilibrium: configuration, multipliers of joints and efforts (m + p,); balance and derivatives there, these
+    as matrices (n, n).
+    """
 
     q: Nodes
     held_by: Array
-    forces: Forces
+    balance: Balance
+    matrices: tuple[Array, Array, Array]
 
 
 class NodalServoed:
@@ -139,22 +146,43 @@ class NodalServoed:
                 found[:, k, 6 * seat.inner : 6 * seat.inner + 6] -= motions.adjoint_inverse(frame)[:, along]
         return found
 
-    def forces(self, demand: Demand, q: Sequence[Nodes], motion: tuple[Array, Array], holding: Array) -> Forces:
+    @cached_property
+    def pairs(self) -> tuple[IntArray, IntArray]:
+        """(P,) nodes, and (P,) those that act on them: themselves, and their neighbours by elements and joints."""
+        own, every = self.system.model.pairs, np.arange(self.system.count)
+        own = own[(own >= 0).all(axis=1)]
+        found = np.unique(np.concatenate([own, own[:, ::-1], np.column_stack([every, every])]), axis=0)
+        return found[:, 0], found[:, 1]
+
+    def balance(self, demand: Demand, q: Sequence[Nodes], motion: tuple[Array, Array], holding: Array) -> Balance:
         """At as many states with twists and their rates (k, n), multipliers and efforts (k, m + p)."""
         held, system, m = self.held(demand, q), self.system, self.system.constraints
         count, n = len(q), self.size
         force, open_ = np.empty((count, n)), np.hstack([np.empty((count, m)), held.gap])
         rows = np.concatenate([np.empty((count, m, n)), held.rows], axis=1)
-        mass, damping, stiffness = np.empty((3, count, n, n))
         for k, (t, v, a) in enumerate(zip(demand.t.tolist(), *motion, strict=True)):
             force[k] = system.residual(t, q[k], v, a)
-            found = system.stiffness_and_damping(t, q[k], v, a, holding[k, :m])
-            stiffness[k], damping[k] = (dense(part) for part in found)
-            mass[k] = dense(system.mass_matrix(t, q[k]))
             open_[k, :m], rows[k, :m] = system.constraint(t, q[k]), dense(system.constraint_matrix(t, q[k]))
         pushed = np.concatenate([rows[:, :m], -held.driven], axis=1).transpose(0, 2, 1)
         force += (pushed @ holding[..., None])[..., 0]
-        return Forces(force, open_, rows, pushed, mass, damping, stiffness)
+        return Balance(force, open_, rows, pushed)
+
+    def blocks(self, demand: Demand, q: Sequence[Nodes], motion: tuple[Array, Array], holding: Array) -> Blocks:
+        """Derivatives at the states of `balance`."""
+        system, (on, by), m = self.system, self.pairs, self.system.constraints
+        found = Blocks(*np.empty((3, len(q), len(on), 6, 6)))
+        for k, (t, v, a) in enumerate(zip(demand.t.tolist(), *motion, strict=True)):
+            stiffness, damping = system.stiffness_and_damping(t, q[k], v, a, holding[k, :m])
+            for blocks, matrix in zip(found, (system.mass_matrix(t, q[k]), damping, stiffness), strict=True):
+                blocks[k] = dense(matrix).reshape(system.count, 6, system.count, 6)[on, :, by]
+        return found
+
+    def whole(self, blocks: Array) -> Array:
+        """(n, n) matrix of blocks (P, 6, 6)."""
+        on, by = self.pairs
+        found = np.zeros((self.system.count, 6, self.system.count, 6))
+        found[on, :, by] = blocks
+        return found.reshape(self.size, self.size)
 
     def rest(self, demand: Demand, near: Nodes) -> Rest:
         """The equilibrium at one time (1,), next to a configuration.
@@ -166,14 +194,15 @@ class NodalServoed:
         """
         q, holding, still = near, np.zeros(self.holding), np.zeros((1, self.size))
         for _ in range(_ITERATIONS):
-            found = self.forces(demand, [q], (still, still), holding[None])
+            at = demand, [q], (still, still), holding[None]
+            found, matrices = self.balance(*at), tuple(self.whole(part[0]) for part in self.blocks(*at))
             zero = np.zeros((self.holding, self.holding))
-            whole = np.block([[found.stiffness[0], found.pushed[0]], [found.rows[0], zero]])
+            whole = np.block([[matrices[2], found.pushed[0]], [found.rows[0], zero]])
             step = np.linalg.solve(whole, -np.concatenate([found.force[0], found.open[0]]))
             q, holding = self.system.compose(q, step[: self.size]), holding + step[self.size :]
             far = float(np.abs(step[: self.size] * self.metres).max())
             if far <= _RESTS * self.reach:
-                return Rest(q, holding, found)
+                return Rest(q, holding, found, (matrices[0], matrices[1], matrices[2]))
             if not np.isfinite(far):
                 break
         raise SimulationError(

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
@@ -27,12 +27,14 @@ from erls.equations.nodal.nodes import Nodes
 from erls.errors import Cause, SimulationError
 from erls.inverse.conditions import Demand
 from erls.inverse.nodal.ends import bounded
-from erls.inverse.nodal.servoed import Forces, NodalServoed, Rest
+from erls.inverse.nodal.servoed import Balance, Blocks, NodalServoed, Rest
 from erls.maths import motion_maps as motions
 from erls.maths.so3 import Array
 
 _ITERATIONS = 30
-_TOLERANCE = 1e-8  # of the size of the mechanism: changes fall by their square, so that the next one is rounding
+_TOLERANCE = 1e-10  # of the size of the mechanism: the last change
+_SLOW = 0.1  # ratio of changes up to which tangents are kept
+_ROUNDING = 1e-14  # of the largest entry of a row: what a factorization, whose fill it would multiply, does without
 
 
 class NodalStates(NamedTuple):
@@ -52,11 +54,12 @@ class _Entries:
     values: list[Array] = field(default_factory=list)
 
     def add(self, blocks: Array, rows: Array, columns: Array) -> None:
-        """Blocks (k, r, c) at rows (k,) and columns (k,)."""
-        k, i, j = np.nonzero(blocks)
-        self.rows.append(rows[k] + i)
-        self.columns.append(columns[k] + j)
-        self.values.append(blocks[k, i, j])
+        """Blocks (..., r, c) at rows (...) and columns (...)."""
+        at = np.nonzero(blocks)
+        first, i, j = at[:-2], *at[-2:]
+        self.rows.append(rows[first] + i)
+        self.columns.append(columns[first] + j)
+        self.values.append(blocks[at])
 
     def matrix(self, size: int) -> sp.csc_array:
         """(size, size)"""
@@ -65,7 +68,7 @@ class _Entries:
 
 
 class _TwoPoint:
-    """The system over all knots: a step of Newton's method from states.
+    """The system over all knots: steps of Newton's method from states that it looks at.
 
     Unknowns are increments (n,) of the knot ahead, increments, multipliers and efforts (n + m + p,) of all knots, and
     increments of the knot behind.
@@ -80,76 +83,91 @@ class _TwoPoint:
         self._at = np.concatenate([[0], n + own * np.arange(count), [n + count * own]])  # columns of knots
         self._blocks = n, own
         self._first = servoed.holding + len(self.ends[0].first)  # row of the first knot
+        self._factors: Any = None
+        self._units, self._rows = np.ones((2, self.size))
 
-    def step(self, q: list[Nodes], holding: Array) -> tuple[Array, Array]:
-        """Increments (k + 2, n) of all knots, changes (k, m + p) of multipliers and efforts."""
+    def look(self, q: list[Nodes], holding: Array) -> None:
+        """Take in configurations of all knots, multipliers and efforts (k, m + p)."""
         poses = np.array([each.poses for each in q])
         steps = motions.log(motions.inverse(poses[:-1]) @ poses[1:])
-        motion = (steps[1:] + steps[:-1]) / (2 * self.h), (steps[1:] - steps[:-1]) / self.h**2
-        flat = motion[0].reshape(len(holding), -1), motion[1].reshape(len(holding), -1)
-        found = self.servoed.forces(self.demand, q[1:-1], flat, holding)
-        matrix, right = _Entries(), np.zeros(self.size)
-        self._knots(matrix, right, found, steps)
-        self._end(matrix, right, q, False)
-        self._end(matrix, right, q, True)
-        solved = self._solved(matrix, right, found)
+        twists = (steps[1:] + steps[:-1]) / (2 * self.h), (steps[1:] - steps[:-1]) / self.h**2
+        motion = twists[0].reshape(len(holding), -1), twists[1].reshape(len(holding), -1)
+        self._state, self._steps = (self.demand, q[1:-1], motion, holding), steps
+        self._found = self.servoed.balance(*self._state)
+        self._beyond = [self._end(q, last) for last in (False, True)]
+
+    def _end(self, q: list[Nodes], last: bool) -> tuple[Balance, Array]:
+        """The knot beyond an end, and how far what is bounded is from rest there."""
+        still = np.zeros((1, self._blocks[0]))
+        demand, none = self.demand.part(slice(-1, None) if last else slice(0, 1)), np.zeros((1, self.servoed.holding))
+        there = self.servoed.balance(demand, [q[-1 if last else 0]], (still, still), none)
+        pair = (q[-2], q[-1]) if last else (q[0], q[1])
+        rest = motions.inverse(self.rests[last].q.poses)
+        parts = zip(self.ends[last], pair, strict=True)
+        away: Array = sum((part @ motions.log(rest @ each.poses).ravel() for part, each in parts), np.zeros(1))
+        return there, away
+
+    def step(self, most: float) -> tuple[Array, Array]:
+        """Increments (k + 2, n) of all knots, changes (k, m + p) of multipliers and efforts; by tangents of an earlier
+        step where that goes no farther than ``most`` [m], for links that bend far are lost in steps by stale ones.
+        """
+        if self._factors is not None:
+            known = self._step()
+            if float(np.abs(known[0] * self.servoed.metres).max()) <= most:
+                return known
+        self._learn()
+        return self._step()
+
+    def _step(self) -> tuple[Array, Array]:
+        found, (ahead, behind) = self._found, self._beyond
+        inside = np.hstack([found.force, found.open]).ravel()
+        right = np.concatenate([ahead[0].open[0], ahead[1], inside, behind[0].open[0], behind[1]])
+        solved = -self._units * self._factors.solve(self._rows * right)
         n, own = self._blocks
         middle = solved[n:-n].reshape(-1, own)
         return np.vstack([solved[:n], middle[:, :n], solved[-n:]]), middle[:, n:]
 
-    def _knots(self, matrix: _Entries, right: Array, found: Forces, steps: Array) -> None:
-        """Balance and conditions at all knots."""
-        n, own = self._blocks
-        at, h = self._at[1:-1], self.h
-        rows = at - n + self._first
-        damping, mass = found.damping / (2 * h), found.mass / h**2
-        fore, back = motions.tangent_inverse(steps), motions.tangent_inverse(-steps)  # of d by its ends
-        matrix.add(_times(mass + damping, fore[1:]), rows, self._at[2:])
-        matrix.add(_times(mass - damping, back[:-1]), rows, self._at[:-2])
-        here = found.stiffness + _times(damping, fore[:-1] - back[1:]) - _times(mass, back[1:] + fore[:-1])
-        matrix.add(here, rows, at)
-        matrix.add(found.pushed, rows, at + n)
-        matrix.add(found.rows, rows + n, at)
-        right[rows[0] : rows[-1] + own] = -np.hstack([found.force, found.open]).ravel()
-
-    def _end(self, matrix: _Entries, right: Array, q: list[Nodes], last: bool) -> None:
-        """Conditions at the knot beyond an end, and what is bounded there."""
-        servoed, n = self.servoed, self._blocks[0]
-        rest, rows, beyond, beside = self.rests[last], self.ends[last], -last, -2 if last else 1
-        demand = self.demand.part(slice(-1, None) if last else slice(0, 1))
-        still = np.zeros((1, n))
-        there = servoed.forces(demand, [q[beyond]], (still, still), np.zeros((1, servoed.holding)))
-        at = self._first + len(self.demand.t) * self._blocks[1] if last else 0
-        matrix.add(there.rows, np.array([at]), self._at[[beyond]])
-        right[at : at + servoed.holding] = -there.open[0]
-        below = at + servoed.holding
-        pair = (beside, beyond) if last else (beyond, beside)
-        for part, k in zip(rows, pair, strict=True):
-            matrix.add(part[None], np.array([below]), self._at[[k]])
-            away = motions.log(motions.inverse(rest.q.poses) @ q[k].poses).ravel()
-            right[below : below + len(part)] -= part @ away
-
-    def _solved(self, matrix: _Entries, right: Array, found: Forces) -> Array:
-        """In metres, and newtons per mass times h²; every row by its largest entry."""
-        n, own = self._blocks
-        metres = self.servoed.metres
-        mass = float((np.einsum("kii->ki", found.mass) / metres**2).max()) or 1.0
-        each = np.concatenate([1 / metres, np.full(own - n, mass / self.h**2)])
-        units = np.concatenate([1 / metres, np.tile(each, len(found.force)), 1 / metres])
-        whole = matrix.matrix(self.size) @ sp.diags_array(units)
-        rows = 1 / np.maximum(abs(whole).max(axis=1).toarray().ravel(), np.finfo(float).tiny)
+    def _learn(self) -> None:
+        """Factor the tangents: in metres, and newtons per mass times h²; every row by its largest entry."""
+        blocks, (n, own), metres = self.servoed.blocks(*self._state), self._blocks, self.servoed.metres
+        on, by = self.servoed.pairs
+        inertia = blocks.mass[:, on == by].diagonal(axis1=2, axis2=3).reshape(-1, n) / metres**2
+        each = np.concatenate([1 / metres, np.full(own - n, (float(inertia.max()) or 1.0) / self.h**2)])
+        self._units = np.concatenate([1 / metres, np.tile(each, len(self.demand.t)), 1 / metres])
+        matrix = _Entries()
+        self._knots(matrix, blocks)
+        for last in (False, True):
+            self._beside(matrix, last)
+        whole = matrix.matrix(self.size) @ sp.diags_array(self._units)
+        self._rows = 1 / np.maximum(abs(whole).max(axis=1).toarray().ravel(), np.finfo(float).tiny)
+        scaled = sp.csc_array(sp.diags_array(self._rows) @ whole)
+        scaled.data[np.abs(scaled.data) < _ROUNDING] = 0.0
+        scaled.eliminate_zeros()
         try:
-            factors = splu(sp.csc_array(sp.diags_array(rows) @ whole))
+            self._factors = splu(scaled)
         except RuntimeError as problem:
             raise np.linalg.LinAlgError(str(problem)) from None
-        return np.asarray(units * factors.solve(rows * right))
 
+    def _knots(self, matrix: _Entries, blocks: Blocks) -> None:
+        """Balance and conditions at all knots."""
+        (n, _), (on, by) = self._blocks, self.servoed.pairs
+        at, rows = self._at[1:-1], self._at[1:-1] - n + self._first
+        damping, mass = blocks.damping / (2 * self.h), blocks.mass / self.h**2
+        parts = motions.tangent_inverse(self._steps), motions.tangent_inverse(-self._steps)  # of d by its ends
+        fore, back = (part[:, by] for part in parts)
+        here = blocks.stiffness + damping @ (fore[:-1] - back[1:]) - mass @ (back[1:] + fore[:-1])
+        sides = (mass + damping) @ fore[1:], here, (mass - damping) @ back[:-1]
+        for values, columns in zip(sides, (self._at[2:], at, self._at[:-2]), strict=True):
+            matrix.add(values, rows[:, None] + 6 * on, columns[:, None] + 6 * by)
+        matrix.add(self._found.pushed, rows, at + n)
+        matrix.add(self._found.rows, rows + n, at)
 
-def _times(blocks: Array, nodes: Array) -> Array:
-    """(k, n, n) matrices times those of each node (k, N, 6, 6)."""
-    k, n, _ = blocks.shape
-    split = blocks.reshape(k, n, -1, 6).transpose(0, 2, 1, 3)
-    return np.asarray((split @ nodes).transpose(0, 2, 1, 3).reshape(k, n, n))
+    def _beside(self, matrix: _Entries, last: bool) -> None:
+        """Conditions at the knot beyond an end, and what is bounded there."""
+        at = self._first + len(self.demand.t) * self._blocks[1] if last else 0
+        matrix.add(self._beyond[last][0].rows, np.array([at]), self._at[[-1 if last else 0]])
+        for part, k in zip(self.ends[last], (-2, -1) if last else (0, 1), strict=True):
+            matrix.add(part[None], np.array([at + self.servoed.holding]), self._at[[k]])
 
 
 def solved(
@@ -171,7 +189,8 @@ def solved(
     system = _TwoPoint(servoed, demand, h, first, last)
     every, worst, far = [first.q, *q, last.q], np.inf, np.zeros(1)
     for iteration in range(1, _ITERATIONS + 1):
-        steps, changes = system.step(every, holding)
+        system.look(every, holding)
+        steps, changes = system.step(_SLOW * worst)
         far = np.abs(steps * servoed.metres).max(axis=1)
         worst = float(far.max())
         told(iteration, worst)

@@ -1,13 +1,14 @@
 """Stress and section forces of links during a motion, from their recovery maps.
 
-What the modes of the scene carry is corrected by the static answer of all others to the loads of the motion (mode
-acceleration): see `fe_import.modal.recovery_maps`.
+Shells of the nodal formulation tell their own. What the modes of the scene carry is corrected by the static answer of
+all others to the loads of the motion (mode acceleration): see `fe_import.modal.recovery_maps`.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from erls.equations.formulation import SurfaceStressed
 from erls.maths.so3 import Array
 from erls.mechanism.links import Link
 from erls.run.chain.instants import Instants
@@ -46,6 +47,10 @@ def recovered(seen: Instants, number: int, static_correction: bool = True) -> Ar
     """
     link = seen.formulation.mechanism.links[number]
     maps = maps_of(link)
+    if isinstance(seen.formulation, SurfaceStressed) and maps.quantity == "stress":
+        own = seen.formulation.surface_stress(number, seen.y, seen.v)
+        if own is not None:  # places are bottom, middle and top of each node
+            return own[:, maps.nodes, np.arange(len(maps.nodes)) % own.shape[2]]
     if link.pieces:
         return _of_pieces(seen, link, static_correction)
     if static_correction:

@@ -107,7 +107,24 @@ class ChainRun(ChainMotion):
     @property
     def loop_names(self) -> tuple[str, ...]:
         """Closing joints."""
-        return tuple(loop.name for loop in self.formulation.mechanism.loops)
+        return tuple(loop.name for loop in self.formulation.mechanism.loops if loop.coupling is None)
+
+    @property
+    def coupling_names(self) -> tuple[str, ...]:
+        """Couplings of joint coordinates."""
+        return tuple(loop.name for loop in self.formulation.mechanism.loops if loop.coupling is not None)
+
+    def coupling_effort(self, coupling: str, t: ArrayLike) -> Array:
+        """(...) torque [N m] or force [N] of a coupling on the joint that follows; on the others it is -ratio times
+        that.
+        """
+        choose(coupling, self.coupling_names, "coupling", SceneError)
+        number = [loop.name for loop in self.formulation.mechanism.loops].index(coupling)
+        _, flat, y, v = self._interpolated(t)
+        chain = cast(LoopFormulation, solved(self.formulation))
+        found = [chain.loop_forces(*at)[number] for at in zip(flat.tolist(), y, v, strict=True)]
+        # along z by a condition or an elastic one that slides, about z by one that turns
+        return np.array([f.force[2] + f.moment[2] for f in found]).reshape(np.shape(t))
 
     def loop_reaction(self, loop: str, t: ArrayLike) -> tuple[Array, Array]:
         """(..., 3) force [N] and (..., 3) moment [N m] of a closing joint on its ``link``, at its displaced node, world
@@ -136,7 +153,7 @@ class ChainRun(ChainMotion):
         return self._of_loop(loop, t, lambda chain, *at: chain.loop_effort(*at))
 
     def _of_loop(self, loop: str, t: ArrayLike, what: Callable[..., float]) -> Array:
-        names = [x.name for x in self.formulation.mechanism.loops if x.freedom is not None]
+        names = [x.name for x in self.formulation.mechanism.loops if x.freedom is not None and x.coupling is None]
         choose(loop, names, "loop", SceneError)
         number, chain = self.loop_names.index(loop), solved(self.formulation)
         _, flat, y, v = self._interpolated(t)

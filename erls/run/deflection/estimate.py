@@ -29,7 +29,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from scipy.ndimage import maximum_filter1d
+from numpy.lib.stride_tricks import sliding_window_view
 
 from erls.maths.so3 import Array, cross_all
 from erls.run.deflection.motion import Bending, BendingRun, Watched, freed
@@ -37,7 +37,7 @@ from erls.run.deflection.orders import Orders, orders
 
 _SMALL = 1e-3  # of the largest strain energy: r means nothing below it
 _ROUND_LOOPS = 2.0  # lever of a linkage: four-bar, five-bar and slider-crank of data/ lie between 1 and 3
-_NEARBY = 7  # samples
+_NEARBY = 7  # samples, odd
 _UNSURE = 0.1  # of what second order does: how far second-order data of a link that is not made of beams may be off
 
 
@@ -205,7 +205,8 @@ def _integral(values: Array, times: Array) -> Array:
 
 def _peaks(values: Array) -> Array:
     """(k,) the largest values nearby: what vibrates is seen at any phase."""
-    return np.asarray(maximum_filter1d(values, _NEARBY))
+    around = np.pad(values, _NEARBY // 2, mode="edge")
+    return np.asarray(sliding_window_view(around, _NEARBY).max(axis=1))
 
 
 def _exits(run: BendingRun, number: int, closed: bool) -> list[_Exit]:

@@ -34,12 +34,15 @@ class Surface:
         Its elements, as places in ``nodes``.
     sets : dict
         Numbers of nodes, and their shares of the set's length.
+    heights : (2,) array
+        Of bottom and top above the nodes [m].
     """
 
     elements: list[Shell]
     nodes: IntArray
     cells: IntArray
     sets: dict[str, tuple[IntArray, Array]]
+    heights: Array
 
 
 def surface(
@@ -62,13 +65,13 @@ def surface(
     edges = _shares(places, cells, sets)
     frames = corner_frames(places, cells, shell.fold_deg, place)
     make = _laminate(record, shell)
-    stiffness, moments = make.stiffness(), make.moments()
+    stiffness, moments, surfaces = make.stiffness(), make.moments(), make.surfaces()
     elements = [
-        Shell(tuple(own[cell].tolist()), frame, stiffness, moments, shell.drilling)
+        Shell(tuple(own[cell].tolist()), frame, stiffness, moments, shell.drilling, surfaces)
         for cell, frame in zip(cells, frames, strict=True)
     ]
     found = {f"{shell.name}:{name}": (own[nodes], share) for name, (nodes, share) in edges.items()}
-    return Surface(elements, own, cells, found)
+    return Surface(elements, own, cells, found, make.heights[[0, -1]])
 
 
 def _patch(
