@@ -100,7 +100,7 @@ def test_equations(form: str) -> None:
     assert np.abs(forces - expected).max() <= 1e-13 * np.abs(expected).max()
     steps = _steps(chain)
     rounding = 1e-15 * np.abs(expected).max() / steps
-    taped = Evaluation(steps, kernels).tangents(system, knots)
+    taped = Evaluation(steps, kernels, True).tangents(system, knots)
     differences = Evaluation(steps).tangents(system, knots)
     assert np.abs(taped.mass - differences.mass).max() <= 1e-13 * np.abs(taped.mass).max()
     for found, of in zip(taped[1:], differences[1:], strict=True):
@@ -126,3 +126,19 @@ def test_states_that_go_different_ways(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_is_not_worth_it() -> None:
     _, system, _ = _case("second order")
     assert eightfold_kernels(system, WORTH - 1) is None
+
+
+@compiled_only
+def test_tangents_of_loops() -> None:
+    """A four-bar, whose conditions close by the angle of a joint: the tape against differences, as above."""
+    changes = ['simulation.integrator="lobatto"', "simulation.duration=0.001", "initial.deformation=zero"]
+    scene: Any = erls.load_scene(
+        DATA / "four_bar" / "flexible.toml", [*changes, *(f"links.{k}.elastic_modes=1" for k in range(3))]
+    )
+    run: Any = erls.simulate(scene, verdict=False)
+    s, system, steps = run.solution, run.formulation.compiled, _steps(run.formulation.bare)
+    knots = Knots(*(x[1:9] for x in (s.t, s.y, s.v, s.a)))
+    taped, differences = (Evaluation(steps, None, on).tangents(system, knots) for on in (True, False))
+    for found, of in zip(taped, differences, strict=True):
+        assert np.abs(found - of).max() <= 1e-9 * np.abs(of).max()
+    assert not np.array_equal(taped.stiffness, differences.stiffness)
