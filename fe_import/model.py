@@ -139,6 +139,24 @@ class ThermalLoad:
     restrained: Array
 
 
+MOST_TRIANGLES = 20_000  # that a rigid link may be drawn with: run files and pictures hold them all
+
+
+@dataclass(frozen=True)
+class Surface:
+    """What a rigid link is drawn as; without mass, and no node of the link.
+
+    Attributes
+    ----------
+    points : (n, 3) array
+        Corners in the mesh frame [m].
+    triangles : (t, 3) int array
+    """
+
+    points: Array
+    triangles: IntArray
+
+
 @dataclass(frozen=True)
 class FEModel:
     """Mass and stiffness matrices of a free link with what is needed to interpret their rows.

@@ -45,10 +45,12 @@ def import_(
         Print one JSON object.
     """
     from erls.cli.reports import bad, write
+    from erls.files.output import replacing
     from erls.files.results import MARK, claim
     from erls.importers.robot_scene import TUBE, imported
     from erls.importers.urdf import read_urdf
     from erls.scene.read import load_scene
+    from fe_import.mesh.surfaces import stl_bytes
 
     target = Path(robot.stem + ".toml") if output is None else output
     if target.suffix != ".toml":
@@ -62,22 +64,26 @@ def import_(
             remedy = "write it first, or check the path, which starts at the scene"
             raise bad(f"no such file: {model}", "--flexible", text, remedy)
         models[name] = model
-    found = imported(read_urdf(robot), robot, target.parent, models, floating, hold, stops)
-    files = {target.parent / "links" / name: text for name, text in found.links.items()}
+    pictures = f"{target.stem}_meshes"
+    found = imported(read_urdf(robot), robot, target.parent, models, floating, hold, stops, pictures)
+    files = {target.parent / "links" / name: f"# {MARK}\n{text}".encode() for name, text in found.links.items()}
+    files |= {target.parent / pictures / name: stl_bytes(seen, MARK) for name, seen in found.surfaces.items()}
     claim(target, ".toml", [robot], force)
     for folder in {path.parent for path in files if not path.parent.exists()}:
         folder.mkdir()
     for path in files:
-        claim(path, ".toml", [robot], force)
-    for path, text in files.items():
-        write(path, f"# {MARK}\n{text}")
+        claim(path, path.suffix, [robot], force)
+    for path, content in files.items():
+        with replacing(path) as temporary:
+            temporary.write_bytes(content)
     write(target, f"# {MARK}\n{found.scene}")
     load_scene(target)  # with descriptions that were there before
     moving = [body.name for body in found.bodies]
     summary = {
         "robot": str(robot),
         "output": str(target),
-        "links": [str(path) for path in files],
+        "links": [str(path) for path in files if path.suffix == ".toml"],
+        "surfaces": [str(path) for path in files if path.suffix == ".stl"],
         "bodies": moving,
         "flexible": models,
         "told": list(found.told),
@@ -86,4 +92,6 @@ def import_(
         return print_json(summary)
     for text in found.told:
         tell(f"note: {text}")
-    print(f"{len(moving)} bodies that move: {', '.join(moving)}\nwritten to {', '.join(map(str, (target, *files)))}")
+    shown = [path for path in files if path.suffix == ".toml"]
+    shown += [target.parent / pictures] if found.surfaces else []
+    print(f"{len(moving)} bodies that move: {', '.join(moving)}\nwritten to {', '.join(map(str, (target, *shown)))}")

@@ -24,6 +24,7 @@ _BEGINS = {
     ".html": b"<!DOCTYPE html>",
     ".json": b"{",
     ".toml": b"#",
+    ".stl": b"written by erls",
     ".pvd": b"<?xml",
     ".png": b"\x89PNG",
     ".jpg": b"\xff\xd8",

@@ -18,10 +18,13 @@ from typing import Any
 import numpy as np
 
 from erls.errors import Cause, SceneError
+from erls.importers.bodies import Body, bodies_of
 from erls.importers.mimic import couplings_of, follows
 from erls.importers.urdf import UrdfJoint, UrdfRobot, angles_of
+from erls.importers.visuals import Seen
 from erls.maths.so3 import Array
 from erls.scene.read import checked
+from fe_import.model import Surface
 
 TUBE = "tube"
 """In place of a description: an aluminium tube of the link's mass and length; ``tube:D`` of an outer diameter D [m]."""
@@ -39,36 +42,6 @@ _SLENDER = 2.0  # length over diameter of what may be called a beam
 
 
 @dataclass(frozen=True)
-class Body:
-    """Links that move as one.
-
-    Attributes
-    ----------
-    joint : UrdfJoint or None
-        That carries it; None for the root.
-    frames : dict of (4, 4) arrays
-        Pose of each of its links in the frame of the first, by name.
-    mass : float
-        [kg]
-    centre_of_mass : (3,) array
-        [m]
-    inertia : (3, 3) array
-        About its centre of mass [kg m²].
-    """
-
-    joint: UrdfJoint | None
-    frames: dict[str, Array]
-    mass: float
-    centre_of_mass: Array
-    inertia: Array
-
-    @property
-    def name(self) -> str:
-        """Of its first link."""
-        return next(iter(self.frames))
-
-
-@dataclass(frozen=True)
 class Imported:
     """A scene and its links as texts.
 
@@ -78,6 +51,8 @@ class Imported:
         TOML.
     links : dict of str
         Descriptions that were made, by file name.
+    surfaces : dict of Surface
+        What rigid links look like, by file name.
     bodies : tuple of Body
         That move.
     told : tuple of str
@@ -86,46 +61,9 @@ class Imported:
 
     scene: str
     links: dict[str, str]
+    surfaces: dict[str, Surface]
     bodies: tuple[Body, ...]
     told: tuple[str, ...]
-
-
-def bodies_of(robot: UrdfRobot) -> tuple[list[Body], list[str]]:
-    """Bodies, parents before children, and what was told on the way."""
-    below = {name: link.mass for name, link in robot.links.items()}
-    for joint in reversed(robot.joints):
-        below[joint.parent] += below[joint.child]
-    home: dict[str, tuple[int, Array]] = {robot.root: (0, np.eye(4))}  # body, and pose in it
-    carriers: list[UrdfJoint | None] = [None]
-    frames: list[dict[str, Array]] = [{robot.root: np.eye(4)}]
-    told = []
-    for joint in robot.joints:
-        number, pose = home[joint.parent]
-        weightless = joint.type != "fixed" and below[joint.child] == 0
-        if weightless:
-            told.append(f"joint {joint.name!r} carries no mass: it is held")
-        if joint.type == "fixed" or weightless:
-            home[joint.child] = number, pose @ joint.origin
-            frames[number][joint.child] = pose @ joint.origin
-            continue
-        home[joint.child] = len(carriers), np.eye(4)
-        carriers.append(replace(joint, parent=next(iter(frames[number])), origin=pose @ joint.origin))
-        frames.append({joint.child: np.eye(4)})
-    return [_body(robot, joint, own) for joint, own in zip(carriers, frames, strict=True)], told
-
-
-def _body(robot: UrdfRobot, joint: UrdfJoint | None, frames: dict[str, Array]) -> Body:
-    parts = [(robot.links[name], pose) for name, pose in frames.items()]
-    mass = sum(link.mass for link, _ in parts)
-    centres = [pose[:3, :3] @ link.centre_of_mass + pose[:3, 3] for link, pose in parts]
-    weighted = (link.mass * centre for (link, _), centre in zip(parts, centres, strict=True))
-    centre = sum(weighted, np.zeros(3)) / (mass or 1.0)
-    inertia = np.zeros((3, 3))
-    for (link, pose), at in zip(parts, centres, strict=True):
-        arm = at - centre
-        turn = pose[:3, :3]
-        inertia += turn @ link.inertia @ turn.T + link.mass * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    return Body(joint, frames, mass, centre, inertia)
 
 
 def imported(
@@ -136,6 +74,7 @@ def imported(
     floating: bool = False,
     hold: bool = False,
     stops: bool = False,
+    pictures: str = "",
 ) -> Imported:
     """Make a scene.
 
@@ -154,6 +93,8 @@ def imported(
         Whether drives hold all joints at their start, instead of leaving them free.
     stops : bool
         Whether limits of joints push back.
+    pictures : str
+        Folder beside the scene for what links look like; left out unless given.
 
     Raises
     ------
@@ -189,20 +130,29 @@ def imported(
         told.append(f"the mass of {base.name!r}, {base.mass:.6g} kg, stands on the ground and is left out")
     seats = {body.name: _seats(body, moving) for body in [base, *moving]}
     files: dict[str, str] = {}
-    links = [_link(body, seats[body.name], flexible.get(body.name, ""), files, told) for body in moving]
+    seen, surfaces = Seen(robot, source, len(moving)), dict[str, Surface]()
+    links = []
+    for body in moving:
+        file, drawn = "", seen.surface(body.frames, body.name in flexible) if pictures else None
+        if drawn is not None:
+            surfaces[name := _file_name(body.name, ".stl", surfaces)] = drawn
+            file = f"{pictures}/{name}"
+        links.append(_link(body, seats[body.name], flexible.get(body.name, ""), files, told, file))
+    if pictures and not floating:
+        seen.leave(base.frames, "it stands on the ground")
     own = [body.joint for body in moving if body.joint is not None]
     held = {joint.name for joint in own if hold and not follows(joint, own)}
     joints = [_joint(body, base.name if not floating else "", seats, held, stops) for body in moving]
     couplings, alone = couplings_of(own)
     points = [p for body in moving for p in _points(body, seats[body.name], flexible.get(body.name, ""), told)]
-    told = [*robot.told, *told, *alone]
+    told = [*robot.told, *told, *alone, *seen.told]
     remarks = [f"# {robot.name}: imported from {source.name}. Mesh frames are the frames of its links."]
     remarks += [f"# - {text}" for text in told]
     head = f"name = {_text(robot.name)}\ngravity = [0.0, 0.0, -9.81]\n\n[simulation]\nduration = 1.0\n"
     scene = "\n".join(["\n".join(remarks), head, *joints, *links, *points, *couplings])
     if not any(flexible.values()):  # those that are must be there first
         checked(tomllib.loads(scene), folder / "scene.toml", str(source))
-    return Imported(scene, files, tuple(moving), tuple(told))
+    return Imported(scene, files, surfaces, tuple(moving), tuple(told))
 
 
 def _seats(body: Body, moving: list[Body]) -> dict[str, Array]:
@@ -268,14 +218,14 @@ def _acting(joint: UrdfJoint, hold: bool, stops: bool) -> list[str]:
     return found
 
 
-def _link(body: Body, seats: Mapping[str, Array], model: str, files: dict[str, str], told: list[str]) -> str:
+def _link(
+    body: Body, seats: Mapping[str, Array], model: str, files: dict[str, str], told: list[str], surface: str
+) -> str:
     assert body.joint is not None
     back = np.degrees(angles_of(_upright(body.joint.axis).T))
     lines = ["[[links]]", f"name = {_text(body.name)}", f"mesh_pose = {{ rotation_deg = {_numbers(back)} }}"]
     if _is_tube(model):
-        stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in body.name)
-        while (file := f"{stem}.toml") in files:  # of another name that differs in what a file's cannot have
-            stem += "_"
+        file = _file_name(body.name, ".toml", files)
         files[file], said = _tube(body, seats, model)
         told.append(said)
         lines.append(f"model = {_text('links/' + file)}")
@@ -286,9 +236,19 @@ def _link(body: Body, seats: Mapping[str, Array], model: str, files: dict[str, s
         points |= {name: pose[:3, 3] for name, pose in body.frames.items()}
         named = ", ".join(f"{_text(name)} = {_numbers(place)}" for name, place in points.items())
         rows = ", ".join(_numbers(row) for row in body.inertia)
+        drawn = f", surface = {_text(surface)}" if surface else ""
         lines.append(f"rigid = {{ mass = {body.mass!r}, centre_of_mass = {_numbers(body.centre_of_mass)}, "
-                     f"inertia = [{rows}], points = {{ {named} }} }}")  # fmt: skip
+                     f"inertia = [{rows}], points = {{ {named} }}{drawn} }}")  # fmt: skip
     return "\n".join(lines) + "\n"
+
+
+def _file_name(link: str, suffix: str, taken: Mapping[str, object]) -> str:
+    """For a link, of characters that all systems take, and unlike those that are taken."""
+    stem = "".join(c if c.isalnum() or c in "-_" else "_" for c in link)
+    known = {name.casefold() for name in taken}
+    while f"{stem}{suffix}".casefold() in known:  # of a name that differs in what a file's cannot have
+        stem += "_"
+    return f"{stem}{suffix}"
 
 
 def _is_tube(model: str) -> bool:

@@ -1,8 +1,8 @@
 """Unified Robot Description Format: what a file says, as records.
 
 Read by the standard library's parser: the packages for URDF that are kept up load meshes, planners and ROS besides.
-What is drawn or checked for collisions does not move a robot and is counted; what would move it and is not known here
-is told (`UrdfRobot.told`). Document types are refused, so that no entity can be expanded.
+What is drawn moves nothing: a fault in it is told and the rest is taken. What is not used is told, too
+(`UrdfRobot.told`). Document types are refused, so that no entity can be expanded.
 """
 
 from __future__ import annotations
@@ -24,13 +24,36 @@ _MOST_BYTES = 50_000_000
 _MOST = 1e6  # m, kg, N: larger numbers are slips
 TYPES = ("revolute", "continuous", "prismatic", "fixed", "floating", "planar")
 _MOMENTS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
+_SIZES = {"mesh": (), "box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
 _LIMITS = ("lower", "upper", "effort", "velocity")
 _KNOWN = {
     "robot": {"link", "joint"},
-    "link": {"inertial"},
+    "link": {"inertial", "visual"},
     "inertial": {"origin", "mass", "inertia"},
     "joint": {"origin", "parent", "child", "axis", "limit", "dynamics", "mimic"},
 }
+
+
+@dataclass(frozen=True)
+class UrdfShape:
+    """What a link looks like, or what of it touches others.
+
+    Attributes
+    ----------
+    kind : str
+        ``mesh``, ``box``, ``cylinder`` or ``sphere``.
+    pose : (4, 4) array
+        In the link's frame.
+    sizes : tuple of float
+        Scales of a mesh along its axes [1], sides of a box, radius and length of a cylinder, radius of a sphere [m].
+    file : str
+        Of a mesh, as it stands.
+    """
+
+    kind: str
+    pose: Array
+    sizes: tuple[float, ...]
+    file: str = ""
 
 
 @dataclass(frozen=True)
@@ -46,12 +69,15 @@ class UrdfLink:
         In the link's frame [m].
     inertia : (3, 3) array
         About the centre of mass, axes of the link's frame [kg m²].
+    visual, collision : tuple of UrdfShape
     """
 
     name: str
     mass: float
     centre_of_mass: Array
     inertia: Array
+    visual: tuple[UrdfShape, ...] = ()
+    collision: tuple[UrdfShape, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -126,7 +152,8 @@ def read_urdf(path: Path) -> UrdfRobot:
     root = _parsed(path)
     ignored: Counter[str] = Counter()
     _count(root, ignored)
-    links = [_link(element, path) for element in root.findall("link")]
+    faults = list[str]()
+    links = [_link(element, path, faults) for element in root.findall("link")]
     joints = [_joint(element, path) for element in root.findall("joint")]
     for what, names in (("link", [link.name for link in links]), ("joint", [joint.name for joint in joints])):
         twice = [name for name, count in Counter(names).items() if count > 1]
@@ -137,7 +164,7 @@ def read_urdf(path: Path) -> UrdfRobot:
     by_name = {link.name: link for link in links}
     ordered, top = _tree(by_name, joints, path)
     told = [f"{count} × <{name}> not used: nothing that moves depends on it" for name, count in sorted(ignored.items())]
-    return UrdfRobot(root.get("name") or path.stem, by_name, tuple(ordered), top, tuple(told))
+    return UrdfRobot(root.get("name") or path.stem, by_name, tuple(ordered), top, (*told, *faults))
 
 
 def _parsed(path: Path) -> ET.Element:
@@ -174,11 +201,12 @@ def _count(root: ET.Element, ignored: Counter[str]) -> None:
         ignored.update(child.tag for child in element if child.tag not in _KNOWN[element.tag])
 
 
-def _link(element: ET.Element, path: Path) -> UrdfLink:
+def _link(element: ET.Element, path: Path, faults: list[str]) -> UrdfLink:
     name = _named(element, "name", path, "link")
     where, inertial = f"link {name!r}", element.find("inertial")
+    shapes = [_shapes(element, kind, path, where, faults) for kind in ("visual", "collision")]
     if inertial is None:
-        return UrdfLink(name, 0.0, np.zeros(3), np.zeros((3, 3)))
+        return UrdfLink(name, 0.0, np.zeros(3), np.zeros((3, 3)), *shapes)
     pose = _pose(inertial.find("origin"), path, where)
     mass = _number(inertial.find("mass"), "value", path, f"{where}: mass")
     tensor = inertial.find("inertia")
@@ -190,7 +218,35 @@ def _link(element: ET.Element, path: Path) -> UrdfLink:
     xx, xy, xz, yy, yz, zz = entries.values()
     inertia = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
     turn = pose[:3, :3]
-    return UrdfLink(name, mass, pose[:3, 3], turn @ inertia @ turn.T)
+    return UrdfLink(name, mass, pose[:3, 3], turn @ inertia @ turn.T, *shapes)
+
+
+def _shapes(link: ET.Element, tag: str, path: Path, where: str, faults: list[str]) -> tuple[UrdfShape, ...]:
+    found = list[UrdfShape]()
+    for element in link.findall(tag):
+        try:
+            found.append(_shape(element, path, f"{where}: {tag}"))
+        except SceneError as problem:
+            value = "" if problem.value is None else f": {problem.value!r}"
+            faults += [f"{where}: a <{tag}> is not drawn: {problem.message}{value}"] if tag == "visual" else []
+    return tuple(found)
+
+
+def _shape(element: ET.Element, path: Path, where: str) -> UrdfShape:
+    forms = [form for form in element.findall("geometry/*") if form.tag in _SIZES]
+    if len(forms) != 1:
+        raise _fault(path, where, f"no geometry of {', '.join(_SIZES)}", None, "give one")
+    form, pose = forms[0], _pose(element.find("origin"), path, where)
+    if form.tag == "mesh":
+        scale = _vector(form, "scale", path, where, np.ones(3))
+        return UrdfShape("mesh", pose, tuple(scale.tolist()), _named(form, "filename", path, where))
+    if form.tag == "box":
+        sizes = _vector(form, "size", path, where, np.zeros(3)).tolist()
+    else:
+        sizes = [_number(form, name, path, where) for name in _SIZES[form.tag]]
+    if min(sizes) <= 0:
+        raise _fault(path, where, f"a {form.tag} without size", None, "give positive sizes")
+    return UrdfShape(form.tag, pose, tuple(sizes))
 
 
 def _joint(element: ET.Element, path: Path) -> UrdfJoint:

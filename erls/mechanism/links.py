@@ -17,7 +17,7 @@ from fe_import.description.records import LinkDescription
 from fe_import.elements.link_shells import LinkShells
 from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_properties
 from fe_import.modal.model import FixedInterfaceModes, ModalModel
-from fe_import.model import InterfaceNode
+from fe_import.model import InterfaceNode, Surface
 
 T = TypeVar("T")
 _MOST_KNOWN = 64  # findings that a link remembers: what varies with every variant must not pile up
@@ -175,7 +175,12 @@ def payload_invariants(model: ModalModel, node: int, offset: Array, mass: float,
 
 
 def rigid_model(
-    name: str, mass: float, centre_of_mass: Array, inertia: Array, interfaces: Mapping[str, Array]
+    name: str,
+    mass: float,
+    centre_of_mass: Array,
+    inertia: Array,
+    interfaces: Mapping[str, Array],
+    surface: Surface | None = None,
 ) -> ModalModel:
     """A rigid link as a modal model with six rigid-body modes.
 
@@ -192,6 +197,8 @@ def rigid_model(
         About the centre of mass [kg m²].
     interfaces : mapping of (3,) arrays
         Positions of the interface nodes and other named points, mesh frame [m].
+    surface : Surface, optional
+        What it is drawn as, instead of lines from point to point.
     """
     nodes = np.stack(list(interfaces.values()))
     c = skew(centre_of_mass)
@@ -238,6 +245,7 @@ def rigid_model(
         lines=np.array([[k, k + 1] for k in range(len(nodes) - 1)], dtype=np.int64).reshape(-1, 2),
         triangles=np.zeros((0, 3), dtype=np.int64),
         provenance={"source": "rigid link of the scene"},
+        surface=surface,
     )
 
 

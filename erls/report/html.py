@@ -128,6 +128,9 @@ class Shape:
         Of nodes.
     rest, moved : (f, n, 3) arrays
         Places of nodes without displacement, and displacements [m], in each frame.
+    weights : (m, n) array, optional
+        Lines and triangles are then over m corners, whose places and displacements are these weighted sums of those of
+        the nodes: of a rigid surface with many corners, four nodes tell all frames.
     """
 
     name: str
@@ -135,6 +138,7 @@ class Shape:
     triangles: list[list[int]]
     rest: Array
     moved: Array
+    weights: Array | None = None
 
 
 def frames_of(nodes: int, most: int = 121) -> int:
@@ -161,6 +165,7 @@ def view(title: str, axis: str, unit: str, times: Array, shapes: Sequence[Shape]
             "triangles": shape.triangles,
             "rest": _packed(shape.rest),
             "moved": _packed(shape.moved),
+            **({} if shape.weights is None else {"weights": _packed(shape.weights)}),
         }
         for shape in shapes
     ]

@@ -42,7 +42,7 @@ from fe_import.modal.damping import damping_ratios
 from fe_import.modal.equal_frequencies import KEPT_WHOLE, kept_whole, whole_count
 from fe_import.modal.file import read_modal_file
 from fe_import.modal.model import ModalModel
-from fe_import.model import InterfaceNode
+from fe_import.model import InterfaceNode, Surface
 from fe_import.models.inertia import inertia_matrix
 
 Message = Callable[[str], None]
@@ -224,6 +224,7 @@ def link_model(scene: Scene, k: int, tell: Message, description: LinkFile | None
             np.array(rigid.centre_of_mass),
             inertia_matrix(rigid.inertia, f"{place}.rigid.inertia", SceneError),
             {n: np.array(p) for n, p in rigid.points.items()},
+            _surface(scene.folder / rigid.surface, f"{place}.rigid.surface") if rigid.surface else None,
         )
     if description is not None:
         from fe_import.reduce import reduce_link  # here, as in `fe_import.cache`
@@ -262,6 +263,13 @@ def link_model(scene: Scene, k: int, tell: Message, description: LinkFile | None
         told = kept_whole(model.frequencies_hz[6:], wanted, kept - 6, f"links.{link.name}.elastic_modes")
         model = replace(model, provenance={**model.provenance, KEPT_WHOLE: told})
     return truncated(model if wanted else unwarmed(model), kept - 6)
+
+
+def _surface(path: Path, place: str) -> Surface:
+    """What a rigid link is drawn as."""
+    from fe_import.mesh.surfaces import read_surface  # here: it imports meshio, which scenes without do not need
+
+    return _within(place, lambda: read_surface(path))
 
 
 def _warmed(model: ModalModel, link: LinkRecord, place: str) -> ModalModel:

@@ -25,6 +25,8 @@ def files_of(scene: AnyScene) -> list[Path]:
     if not isinstance(scene, Scene):
         found += [scene.folder / shell.mesh for shell in scene.record.shells if shell.mesh]
     for link in scene.record.links if isinstance(scene, Scene) else ():
+        if link.rigid is not None and link.rigid.surface:
+            found.append(scene.folder / link.rigid.surface)
         if link.modal_file:
             found.append(scene.folder / link.modal_file)
         if link.model:

@@ -23,12 +23,16 @@ class RigidBody(Record, frozen=True):
         [m]
     inertia : (3,) floats or (3, 3) floats
         About the centre of mass [kg m²]: [Ixx, Iyy, Izz], or a symmetric matrix.
+    surface : str
+        STL or OBJ file of at most 20 000 triangles, in metres in the link's frame, that pictures show instead of lines
+        from point to point; the path starts at the scene. It is drawn only and has no mass.
     """
 
     mass: float
     points: dict[str, Vector]
     centre_of_mass: Vector = (0.0, 0.0, 0.0)
     inertia: Inertia = (0.0, 0.0, 0.0)
+    surface: str = ""
 
 
 class MeshPose(Pose, frozen=True):

@@ -21,7 +21,7 @@ from erls.files.results import MARK, MODAL, claim
 from erls.scene.bodies.schema import ShellSurface
 from erls.scene.build import cache_folder
 from erls.scene.inputs import files_of
-from erls.scene.links import Link
+from erls.scene.links import Link, RigidBody
 from erls.scene.read import AnyScene, checked
 from erls.scene.sampled import sampled_load, sampled_motion
 from fe_import.files.docstrings import record_texts
@@ -30,7 +30,8 @@ from fe_import.modal.model import ModalModel
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _WHERE = "make_scene"
-_PATHS = {Link: ("model", "modal_file"), ShellSurface: ("mesh",)}  # fields that name files, beside those of CSV tables
+# fields that name files, beside those of CSV tables
+_PATHS = {Link: ("model", "modal_file"), RigidBody: ("surface",), ShellSurface: ("mesh",)}
 
 
 def make_scene(*, folder: Path | str = ".", **tables: Any) -> AnyScene:

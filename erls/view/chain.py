@@ -16,11 +16,12 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import single
 from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
-from erls.run.chain.places import node_positions, rigid_frames, rigid_positions
+from erls.run.chain.places import node_positions, rigid_frames, rigid_positions, surface_positions
 from erls.run.chain.run import ChainRun
 from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
 from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines, thick
 from erls.view.stress import chain_stress
+from fe_import.model import IntArray
 
 
 @dataclass(frozen=True)
@@ -85,8 +86,8 @@ class ChainPose(Pose):
         return [self._nodes(p.link, magnification, [p.node])[0] for p in self.mechanism.points]
 
     def nodes(self, magnification: float) -> list[Array]:
-        """(n, 3) nodes of each link."""
-        return [self._nodes(k, magnification) for k in self.mechanism.bodies]
+        """(n, 3) nodes of each link, then the corners of its surface."""
+        return [self._drawn(k, magnification) for k in self.mechanism.bodies]
 
     def deflections(self) -> list[Array]:
         """(n,) of each link against the equivalent rigid one [m]."""
@@ -96,7 +97,7 @@ class ChainPose(Pose):
         """(n,) of each link's nodes."""
         if self.stress is None:
             return super().values()
-        every = [(self.stress[k], len(self.mechanism.links[k].model.nodes)) for k in self.mechanism.bodies]
+        every = [(self.stress[k], len(_corners(self.mechanism.links[k]))) for k in self.mechanism.bodies]
         return [np.full(count, np.nan) if own is None else own for own, count in every]
 
     @property
@@ -111,10 +112,10 @@ class ChainPose(Pose):
         """Deformed links."""
         found = []
         for link, places, values in zip(self._links, self.nodes(magnification), self.values(), strict=True):
-            model, root, triangles = link.model, link.inboard.node, link.model.triangles
+            model, root, (triangles, lines) = link.model, link.inboard.node, _cells(link)
             if len(model.heights):
                 places, triangles, values = thick(places, triangles, model.heights, values)
-            surface = part_surface(places, triangles, chains(model.nodes, model.lines), root, values, unit)
+            surface = part_surface(places, triangles, chains(model.nodes, lines), root, values, unit)
             found.append(Part(surface, bool(len(triangles))))
         return found
 
@@ -131,33 +132,59 @@ class ChainPose(Pose):
 
         result = []
         for link, places in zip(self._links, self.nodes(0.0), strict=True):
-            if len(link.model.triangles):
-                solid = pv.PolyData.from_regular_faces(places, link.model.triangles)
+            triangles, lines = _cells(link)
+            if len(triangles):
+                solid = pv.PolyData.from_regular_faces(places, triangles)
                 result.append(solid.extract_feature_edges(SHARP))
-            runs = chains(link.model.nodes, link.model.lines)
+            runs = chains(link.model.nodes, lines)
             if runs:
                 result.append(polylines(places, runs))
         return result
 
     def meshes(self, magnification: float) -> list[PartMesh]:
-        """Links, in the order of their nodes."""
+        """Links, in the order of their nodes, then of the corners of their surfaces."""
         found = []
         for k, places in zip(self.mechanism.bodies, self.nodes(magnification), strict=True):
             link = self.mechanism.links[k]
             stress = None if self.stress is None else self.stress[k]
             more = {} if stress is None else {"von_mises_MPa": stress}
-            model = link.model
-            cells = [(kind, c) for kind, c in (("line", model.lines), ("triangle", model.triangles)) if len(c)]
+            triangles, lines = _cells(link)
+            cells = [(kind, c) for kind, c in (("line", lines), ("triangle", triangles)) if len(c)]
             cells = cells or [("vertex", np.arange(len(places))[:, None])]
-            found.append(PartMesh(link.name, places, cells, self._displacement(k), more))
+            rigid = link.model.surface is not None
+            found.append(PartMesh(link.name, places, cells, self._displacement(k), more, rigid))
         return found
 
     def _nodes(self, link: int, magnification: float, nodes: Any = slice(None)) -> Array:
         return node_positions(self.mechanism, self.state, link, nodes, magnification)
 
+    def _drawn(self, link: int, magnification: float) -> Array:
+        """(n, 3) nodes, then corners."""
+        surface, nodes = self.mechanism.links[link].model.surface, self._nodes(link, magnification)
+        if surface is None:
+            return nodes
+        corners = surface_positions(self.mechanism, self.state, link, surface.points, magnification)
+        return np.concatenate([nodes, corners])
+
     def _displacement(self, link: int) -> Array:
-        """(n, 3) against the equivalent rigid link, world axes [m]."""
+        """(n, 3) of nodes and corners against the equivalent rigid link, world axes [m]."""
+        if self.mechanism.links[link].model.surface is not None:
+            return self._drawn(link, 1.0) - self._drawn(link, 0.0)
         return self._nodes(link, 1.0) - rigid_positions(self.mechanism, self.state, link)
+
+
+def _corners(link: Link) -> Array:
+    """(n, 3) nodes, then corners of the surface, mesh frame."""
+    model = link.model
+    return model.nodes if model.surface is None else np.concatenate([model.nodes, model.surface.points])
+
+
+def _cells(link: Link) -> tuple[IntArray, IntArray]:
+    """Triangles and lines that are drawn, over nodes and corners; a surface stands in place of both of the nodes."""
+    model = link.model
+    if model.surface is None:
+        return model.triangles, model.lines
+    return model.surface.triangles + len(model.nodes), model.lines[:0]
 
 
 def joint_places(mechanism: Mechanism, state: State, magnification: float) -> list[JointPlace]:

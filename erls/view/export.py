@@ -38,9 +38,9 @@ def export_paraview(
     """Write the deformed links, or beams and bodies: NAME.pvd and a folder NAME_files with a .vtu for each time and
     link.
 
-    Points are deformed positions [m], in the order of the link's nodes. Point data: ``displacement`` against the
-    Equivalent Rigid Link System, of beams and bodies against where they are built, world axes [m], always true;
-    ``link`` counts links from 1, ``part`` beams and bodies.
+    Points are deformed positions [m], in the order of the link's nodes, then of the corners of its surface where it has
+    one. Point data: ``displacement`` against the Equivalent Rigid Link System, of beams and bodies against where they
+    are built, world axes [m], always true; ``link`` counts links from 1, ``part`` beams and bodies.
 
     Parameters
     ----------

@@ -47,7 +47,7 @@ class Part:
 @dataclass(frozen=True)
 class PartMesh:
     """A link, beam or body for ParaView: (n, 3) points, cells by kind, true displacements (n, 3) [m], and what else is
-    known at its points.
+    known at its points; ``rigid``: all points move as one body.
     """
 
     name: str
@@ -55,6 +55,7 @@ class PartMesh:
     cells: list[tuple[str, Any]]
     displacement: Array
     more: dict[str, Array] = field(default_factory=dict)
+    rigid: bool = False
 
 
 class Pose(ABC):

@@ -95,7 +95,11 @@ def _moving(run: Run) -> Iterator[str]:
     drawn = figure_of(run)
     first = drawn.poses([run.start])[0].meshes(0.0)
     kept = [_cells(mesh.cells, len(mesh.points)) for mesh in first]
-    times = run.spread(frames_of(sum(len(nodes) for nodes, _, _ in kept)))
+    carried = [
+        _carried(mesh.points, nodes) if mesh.rigid else (nodes, None)
+        for mesh, (nodes, _, _) in zip(first, kept, strict=True)
+    ]
+    times = run.spread(frames_of(sum(len(nodes) for nodes, _ in carried)))
     poses = [pose.meshes(0.0) for pose in drawn.poses(times)]
     shapes = [
         Shape(
@@ -104,8 +108,9 @@ def _moving(run: Run) -> Iterator[str]:
             triangles,
             np.array([pose[k].points[nodes] for pose in poses]),
             np.array([pose[k].displacement[nodes] for pose in poses]),
+            weights,
         )
-        for k, (mesh, (nodes, lines, triangles)) in enumerate(zip(first, kept, strict=True))
+        for k, (mesh, (_, lines, triangles), (nodes, weights)) in enumerate(zip(first, kept, carried, strict=True))
     ]
     yield heading("Motion" if run.axis.unit == "s" else "Path")
     title = "Turn it by dragging; colours show how far links are bent"
@@ -142,6 +147,26 @@ def _cells(
     number = np.full(count, -1)
     number[nodes] = np.arange(len(nodes))
     return nodes, number[lines].tolist(), number[triangles].tolist()
+
+
+def _carried(points: Array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64], Array]:
+    """Up to four of the nodes of a rigid body that span it, each the farthest from the span of those before, and the
+    weights (n, 4) by which they place all nodes.
+    """
+    places = np.column_stack([points[nodes], np.ones(len(nodes))])
+    places[:, :3] -= places[:, :3].mean(axis=0)
+    left, chosen = places[:, :3].copy(), list[int]()
+    for _ in range(4):
+        far = int(np.linalg.norm(left, axis=1).argmax())
+        if not chosen:
+            left -= left[far]
+        else:
+            along = left[far] / max(float(np.linalg.norm(left[far])), 1e-300)
+            left -= np.outer(left @ along, along)
+        chosen.append(far)
+    chosen = list(dict.fromkeys(chosen))
+    weights = np.linalg.lstsq(places[chosen].T, places.T, rcond=None)[0].T
+    return nodes[chosen], weights
 
 
 def _histories(x: str, along: Array, found: Sequence[tuple[str, Quantity]]) -> Iterator[str]:

@@ -89,6 +89,9 @@ def _check_shapes(model: ModalModel, check: Check) -> None:
         ("pictures/triangles", model.triangles, (None, 3), "i"),
         ("pictures/heights", model.heights, (len(model.heights) and len(model.nodes), 2), "f"),
     ]
+    if model.surface is not None:
+        arrays.append(("pictures/surface/points", model.surface.points, (None, 3), "f"))
+        arrays.append(("pictures/surface/triangles", model.surface.triangles, (None, 3), "i"))
     for number, one in enumerate(model.interface_nodes, start=1):
         place = f"interfaces/{number:04d}"
         arrays.append((f"{place}/position", one.position, (3,), "f"))
@@ -141,6 +144,10 @@ def _check_tables(model: ModalModel, check: Check) -> None:
         ("pictures/triangles", model.triangles),
     ):
         check.each((nodes >= 0) & (nodes < n), nodes, item, "no such node", f"0 to {n - 1}")
+    if model.surface is not None:
+        corners, n = model.surface.triangles, len(model.surface.points)
+        inside = (corners >= 0) & (corners < n)
+        check.each(inside, corners, "pictures/surface/triangles", "no such corner", f"0 to {n - 1}")
     for item, values in (
         ("frequencies_hz", model.frequencies_hz),
         ("damping_ratios", model.damping_ratios),

@@ -31,7 +31,7 @@ from fe_import.modal.model import FixedInterfaceModes, HealthCheck, ModalModel
 from fe_import.modal.recovery_file import read_recovery, write_recovery
 from fe_import.modal.second_order_file import read_second_order, write_second_order
 from fe_import.modal.thermal_file import read_thermal, write_thermal
-from fe_import.model import Array, IntArray, InterfaceNode
+from fe_import.model import MOST_TRIANGLES, Array, IntArray, InterfaceNode, Surface
 
 SCHEMA = "erls modal model"
 SCHEMA_VERSION = 4
@@ -127,6 +127,10 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
         write_array(group, name, values, unit, description)
     if len(model.heights):
         write_array(group, "pictures/heights", model.heights, "m", "bottom and top of shells above each node")
+    if model.surface is not None:
+        corners, triangles = model.surface.points, model.surface.triangles
+        write_array(group, "pictures/surface/points", corners, "m", "corners of what a rigid link is drawn as")
+        write_array(group, "pictures/surface/triangles", triangles, "1", "of these corners, from 0")
     write_strings(group, "kinds", model.kinds, "what moves in each mode")
     write_strings(group, "health/names", tuple(c.name for c in model.health), "checks of the reduction")
     write_strings(group, "node_names/names", tuple(model.node_names), "names of node_names/nodes")
@@ -219,6 +223,7 @@ def read_modal_group(group: h5py.Group, where: str) -> ModalModel:
         else None,
         thermal=read_thermal(file.subgroup("thermal"), m) if "thermal" in inside else None,
         heights=_read_heights(file, n),
+        surface=_read_surface(file),
     )
     validate(model, where, (group.name or "").rstrip("/"))
     return model
@@ -229,6 +234,18 @@ def _read_heights(file: Reader, nodes: int) -> Array:
     if "heights" not in file.subgroup("pictures").names_inside():
         return np.zeros((0, 2))
     return file.array("pictures/heights", (nodes, 2))
+
+
+def _read_surface(file: Reader) -> Surface | None:
+    """Of rigid links, where one is given."""
+    if "surface" not in file.subgroup("pictures").names_inside():
+        return None
+    points = file.array("pictures/surface/points", (None, 3))
+    triangles = file.integers("pictures/surface/triangles", (None, 3), 0, len(points))
+    if len(triangles) > MOST_TRIANGLES:
+        message = "more triangles than a link may be drawn with"
+        raise file.fail("pictures/surface/triangles", message, len(triangles), MOST_TRIANGLES)
+    return Surface(points, triangles)
 
 
 def _read_node_names(file: Reader, nodes: int) -> dict[str, int]:

@@ -10,7 +10,7 @@ from fe_import.modal.inertia import InertiaInvariants, MassProperties, mass_prop
 from fe_import.modal.recovery_maps import RecoveryMaps
 from fe_import.modal.second_order import SecondOrder
 from fe_import.modal.thermal import ThermalExpansion
-from fe_import.model import Array, IntArray, InterfaceNode
+from fe_import.model import Array, IntArray, InterfaceNode, Surface
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
 
@@ -87,6 +87,8 @@ class ModalModel:
         For pictures.
     heights : (n, 2) array
         Of the bottom and the top of shells above each node, along their normals, for pictures; (0, 2) without any [m].
+    surface : Surface or None
+        Of a rigid link, what pictures show instead.
     provenance : dict of str
         Source file, SHA-256, tool versions, method, options.
     recovery : RecoveryMaps or None
@@ -121,6 +123,7 @@ class ModalModel:
     second_order: SecondOrder | None = None
     thermal: ThermalExpansion | None = None
     heights: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    surface: Surface | None = None
 
     @property
     def modes(self) -> int:

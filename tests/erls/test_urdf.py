@@ -22,7 +22,8 @@ import erls
 from erls.cli.main import main
 from erls.equations.registry import formulate
 from erls.errors import Cause, SceneError
-from erls.importers.robot_scene import bodies_of, imported
+from erls.importers.bodies import bodies_of
+from erls.importers.robot_scene import imported
 from erls.importers.urdf import angles_of, read_urdf
 from erls.maths.so3 import fixed_axes
 from erls.scene.build import build_mechanism
@@ -190,15 +191,18 @@ def test_mimic_joints_are_couplings(tmp_path: Path) -> None:
 
 
 def test_what_is_not_used_is_told(tmp_path: Path) -> None:
-    """Drawings by count, joints that carry nothing."""
+    """Contact shapes by count, drawings without a shape, joints that carry nothing."""
     text = """<robot name="r"><link name="a"/>
-    <link name="b"><visual/><visual/><inertial><mass value="1"/></inertial></link>
+    <link name="b"><visual/><collision/><collision/><inertial><mass value="1"/></inertial></link>
     <link name="c"/><joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 2"/></joint>
     <joint name="k" type="continuous"><parent link="b"/><child link="c"/></joint></robot>"""
     file = tmp_path / "r.urdf"
     file.write_text(text, encoding="utf-8")
     robot = read_urdf(file)
-    assert robot.told == ("2 × <visual> not used: nothing that moves depends on it",)
+    assert robot.told == (
+        "2 × <collision> not used: nothing that moves depends on it",
+        "link 'b': a <visual> is not drawn: no geometry of mesh, box, cylinder, sphere",
+    )
     assert bodies_of(robot)[1] == ["joint 'k' carries no mass: it is held"]
     assert robot.joints[0].axis.tolist() == [0, 0, 1]
 

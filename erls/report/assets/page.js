@@ -77,7 +77,8 @@
 
   function drawView(box) {
     const told = read(box), frames = told.times.length;
-    const parts = told.parts.map((part) => ({ ...part, rest: numbers(part.rest), moved: numbers(part.moved) }));
+    const parts = told.parts.map((part) => ({ ...part, rest: numbers(part.rest), moved: numbers(part.moved),
+      weights: part.weights ? numbers(part.weights) : null }));
     const controls = document.getElementById(box.id + "-controls");
     const [time, factor] = controls.querySelectorAll("input"), [timeText, factorText] = controls.querySelectorAll("output");
     const play = controls.querySelector("button");
@@ -90,12 +91,25 @@
     }
     const magnification = () => Math.pow(10, Number(factor.value));
 
+    // What is drawn at a frame: nodes, or the corners of a rigid surface, which are weighted sums of nodes.
+    function drawnAt(part, frame, values) {
+      const n = part.nodes, own = values.subarray(frame * n * 3, (frame + 1) * n * 3);
+      if (!part.weights) return own;
+      const found = new Float32Array((part.weights.length / n) * 3);
+      for (let i = 0; i < found.length; i++) {
+        const row = Math.floor(i / 3) * n;
+        for (let k = 0; k < n; k++) found[i] += part.weights[row + k] * own[3 * k + (i % 3)];
+      }
+      return found;
+    }
+
     function places(part, frame) {
-      const scale = magnification(), at = frame * part.nodes * 3, found = { x: [], y: [], z: [], size: [] };
-      for (let k = 0; k < part.nodes; k++) {
-        const i = at + 3 * k, dx = part.moved[i], dy = part.moved[i + 1], dz = part.moved[i + 2];
-        found.x.push(part.rest[i] + scale * dx); found.y.push(part.rest[i + 1] + scale * dy);
-        found.z.push(part.rest[i + 2] + scale * dz); found.size.push(1e3 * Math.hypot(dx, dy, dz));
+      const scale = magnification(), found = { x: [], y: [], z: [], size: [] };
+      const rest = drawnAt(part, frame, part.rest), moved = drawnAt(part, frame, part.moved);
+      for (let i = 0; i < rest.length; i += 3) {
+        const dx = moved[i], dy = moved[i + 1], dz = moved[i + 2];
+        found.x.push(rest[i] + scale * dx); found.y.push(rest[i + 1] + scale * dy);
+        found.z.push(rest[i + 2] + scale * dz); found.size.push(1e3 * Math.hypot(dx, dy, dz));
       }
       return found;
     }
@@ -134,9 +148,12 @@
     function ranges() {
       const low = [Infinity, Infinity, Infinity], high = [-Infinity, -Infinity, -Infinity], s = magnification();
       for (const part of parts) {
-        for (let k = 0; k < part.rest.length; k++) {
-          const value = part.rest[k] + s * part.moved[k];
-          low[k % 3] = Math.min(low[k % 3], value); high[k % 3] = Math.max(high[k % 3], value);
+        for (let frame = 0; frame < frames; frame++) {
+          const rest = drawnAt(part, frame, part.rest), moved = drawnAt(part, frame, part.moved);
+          for (let k = 0; k < rest.length; k++) {
+            const value = rest[k] + s * moved[k];
+            low[k % 3] = Math.min(low[k % 3], value); high[k % 3] = Math.max(high[k % 3], value);
+          }
         }
       }
       const reach = Math.max(...high.map((value, k) => value - low[k])) || 1;

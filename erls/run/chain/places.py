@@ -48,6 +48,18 @@ def rigid_positions(mechanism: Mechanism, state: State | StateSeries, link: int,
     return _placed(rigid_frames(mechanism, state)[link], mechanism.links[link].model.nodes[nodes])
 
 
+def surface_positions(
+    mechanism: Mechanism, state: State | StateSeries, link: int, points: Array, magnification: float = 1.0
+) -> Array:
+    """(..., n, 3) world positions of points (n, 3) that ride on a rigid link, given in its mesh frame; see
+    `node_positions`.
+    """
+    if magnification == 1.0:
+        return _placed(state.poses[link], points)
+    rigid = _placed(rigid_frames(mechanism, state)[link], points)
+    return np.asarray(rigid + magnification * (_placed(state.poses[link], points) - rigid))
+
+
 def rigid_frames(mechanism: Mechanism, state: State | StateSeries) -> list[Array]:
     """(..., 4, 4) frames of all links in the rigid chain at the same joint coordinates; where only the places of nodes
     are known, those that come nearest to them.
