@@ -22,7 +22,7 @@ def import_(
     force: Force = False,
     json: Json = False,
 ) -> None:
-    """Make a scene of a robot in URDF: joints, masses, limits, damping; links become flexible where asked.
+    """Make a scene of a robot in URDF: joints, masses, limits, damping, looks; links become flexible where asked.
 
     Parameters
     ----------

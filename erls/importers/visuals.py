@@ -74,14 +74,18 @@ class Seen:
         starts = np.cumsum([0, *(len(part.points) for part in parts[:-1])])
         triangles = np.concatenate([part.triangles + start for part, start in zip(parts, starts, strict=True)])
         whole = Surface(np.concatenate([part.points for part in parts]), triangles)
-        if len(triangles) <= self._most:
-            return whole
-        from fe_import.mesh.surfaces import thinned
+        from fe_import.mesh.surfaces import as_stored, thinned  # here: it imports meshio
 
+        first = next(iter(frames))
         fewer = thinned(whole, self._most)
-        now = f"{len(triangles)} triangles are thinned to {len(fewer.triangles)} for pictures"
-        self.told.append(f"link {next(iter(frames))!r}: {now}")
-        return fewer
+        if fewer is not whole:
+            now = f"{len(triangles)} triangles are thinned to {len(fewer.triangles)} for pictures"
+            self.told.append(f"link {first!r}: {now}")
+        try:
+            return as_stored(fewer, first)
+        except FEImportError as problem:
+            self.told.append(f"link {first!r}: not drawn: {problem.message}")
+            return None
 
 
 def _drawn(shapes: Sequence[UrdfShape], source: Path, known: Known) -> tuple[list[Surface], list[str]]:

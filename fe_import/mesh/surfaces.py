@@ -51,6 +51,26 @@ def read_surface(path: Path, most: int | None = MOST_TRIANGLES) -> Surface:
         message, limit = "too large for a surface that is only drawn", f"{_MOST_BYTES} bytes"
         raise FEImportError(Cause.NOT_READABLE, message, where=where, value=status.st_size, limit=limit, remedy=remedy)
     points, triangles = _obj(path) if path.suffix.lower() == ".obj" else _stl(path)
+    return sound(points, triangles, where, most)
+
+
+def sound(points: Array, triangles: IntArray, where: str, most: int | None = MOST_TRIANGLES) -> Surface:
+    """A surface that can be drawn: what lies in no triangle, and triangles without three corners, are left out.
+
+    Parameters
+    ----------
+    points : (n, 3) array
+    triangles : (t, 3) int array
+    where : str
+        For messages.
+    most : int or None
+
+    Raises
+    ------
+    FEImportError
+        MESH: as `read_surface`.
+    """
+    remedy = "give an STL or OBJ file of moderate size"
     if len(triangles) and not 0 <= triangles.min() <= triangles.max() < len(points):
         message = "triangles refer to corners that are not in the file"
         raise FEImportError(Cause.MESH, message, where=where, remedy="write the file again")
@@ -68,7 +88,7 @@ def read_surface(path: Path, most: int | None = MOST_TRIANGLES) -> Surface:
 
 def thinned(surface: Surface, most: int) -> Surface:
     """A surface of at most so many triangles: corners in one cell of a grid become their mean (Rossignac and Borrel,
-    1993), in the finest of growing grids that does.
+    1993), in the first of growing grids that does.
     """
     points, triangles = surface.points, surface.triangles
     if len(triangles) <= most:
@@ -78,15 +98,28 @@ def thinned(surface: Surface, most: int) -> Surface:
     width = max(0.25 * (area / most) ** 0.5, 1e-6 * float(np.ptp(points, axis=0).max()))
     while True:
         cells = np.floor((points - points.min(axis=0)) / width).astype(np.int64)
-        _, own, count = np.unique(cells, axis=0, return_inverse=True, return_counts=True)
-        own = own.ravel()
+        _, own, count = np.unique(_numbers(cells), return_inverse=True, return_counts=True)
         means = np.stack([np.bincount(own, points[:, k]) / count for k in range(3)], axis=1)
         found = own[triangles]
-        _, first = np.unique(np.sort(found, axis=1), axis=0, return_index=True)
+        _, first = np.unique(_numbers(np.sort(found, axis=1)), return_index=True)
         places, left = _used(means, found[np.sort(first)])
         if len(left) <= most:
             return Surface(places, left)
-        width *= 1.12
+        width *= max(1.05, 0.95 * (len(left) / most) ** 0.5)  # a surface has cells by the square of their width
+
+
+def _numbers(rows: IntArray) -> IntArray:
+    """One number for each row of three, equal for equal rows; of at most 1e6 on each side, or corners."""
+    x, y, z = rows.T
+    return np.asarray((x * (y.max() + 1) + y) * (z.max() + 1) + z)
+
+
+def as_stored(surface: Surface, where: str) -> Surface:
+    """As its STL file will be read; FEImportError, MESH, where nothing is left in single precision."""
+    with np.errstate(over="ignore"):
+        rounded = surface.points.astype(np.float32)
+    points, own = np.unique(rounded, axis=0, return_inverse=True)
+    return sound(points.astype(np.float64), own.reshape(-1)[surface.triangles], where)
 
 
 def stl_bytes(surface: Surface, remark: str) -> bytes:

@@ -137,7 +137,8 @@ def test_what_cannot_be_drawn_is_told_and_the_rest_is_drawn(
     shapes = "".join(visual(mesh(name)) for name in bad)
     shapes += visual('<box size="0 1 1"/>') + visual('<capsule radius="1"/>') + visual('<sphere radius="big"/>')
     contact = visual('<box size="1 1 1"/>', tag="collision")
-    path = robot(tmp_path, shapes + contact, visual(mesh("a.dae")) + visual('<box size="1 1 1"/>'), visual("<box/>"))
+    lost = visual('<sphere radius="1e-4"/>', '<origin xyz="1e5 1e5 1e5"/>')  # a point, in single precision
+    path = robot(tmp_path, shapes + contact, lost, visual("<box/>"))
     meshes = path.parents[1] / "meshes"
     (meshes / "empty.obj").write_text("v 0 0 0\n", encoding="utf-8")
     (meshes / "far.obj").write_text(f"v 0 0 0\nf 1 2 {10**30}\n", encoding="utf-8")
@@ -150,8 +151,9 @@ def test_what_cannot_be_drawn_is_told_and_the_rest_is_drawn(
         assert any(name in text and reason in text and "'arm'" in text for text in told), (name, told)
     for words in ("a box without size", "no geometry of mesh", "not a finite number", "drawn by its shapes"):
         assert any(words in text for text in told), words
+    assert any("'hand': not drawn: no triangles" in text for text in told)
+    assert "surface" not in links["hand"]["rigid"]
     assert volume(read_surface(scene.parent / links["arm"]["rigid"]["surface"]))[0] == pytest.approx(1.0)
-    assert "surface" in links["hand"]["rigid"]
 
 
 def test_packages_are_found_above_the_file(tmp_path: Path) -> None:

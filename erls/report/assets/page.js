@@ -83,8 +83,9 @@
     const [time, factor] = controls.querySelectorAll("input"), [timeText, factorText] = controls.querySelectorAll("output");
     const play = controls.querySelector("button");
     time.max = frames - 1;
-    let largest = 0;
+    let largest = 0, farthest = 0;
     for (const part of parts) {
+      for (const value of part.rest) farthest = Math.max(farthest, Math.abs(value));
       for (let k = 0; k < part.moved.length; k += 3) {
         largest = Math.max(largest, Math.hypot(part.moved[k], part.moved[k + 1], part.moved[k + 2]));
       }
@@ -125,7 +126,7 @@
     }
 
     const COLOURS = ["#4c5bd4", "#29a9d8", "#5cc26a", "#e8b03a", "#c62828"].map((c, k) => [k / 4, c]);
-    const scale = { colorscale: COLOURS, cmin: 0, cmax: 1e3 * largest || 1 };
+    const scale = { colorscale: COLOURS, cmin: 0, cmax: largest > 1e-12 * farthest ? 1e3 * largest : 1 }; // less is rounding
     const legend = { title: { text: "deflection [mm]", side: "right" }, thickness: 12, len: 0.7, outlinewidth: 0 };
     function trace(part, frame, first) {
       const found = places(part, frame);
