@@ -133,10 +133,12 @@ def _body(source: Path, output: Path, force: bool, json: bool) -> None:
     else:
         nodes = write_sid(output, model)
         count = model.elastic_modes
-        found = {"nodes": nodes}
+        found = {"nodes": nodes, "left_out": [] if model.recovery is None else ["sigma"]}
         places = "nodes: " + ", ".join(f"{name} is {number}" for name, number in nodes.items())
     if json:
         return print_json({"link": model.name, "modes": count, **found, "files": [str(output)]})
     print(f"{model.name}: {count} modes, in which {model.interface_nodes[0].name} rests")
     print(places)
+    if found.get("left_out"):
+        print("left out: stress and section forces, sigma")
     print(f"written: {output}")

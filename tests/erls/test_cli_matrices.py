@@ -87,7 +87,11 @@ def test_standard_input_data(modal: Path, tmp_path: Path, capsys: pytest.Capture
         assert (told["modes"], told["nodes"]["root"], told["nodes"]["tip"]) == (18, 1, 2)
         texts.append((tmp_path / "l.SID_FEM").read_text("ascii"))
     assert texts[0] == texts[1]
-    assert "18 modes, in which root rests" in exported(capsys, str(modal), "-o", str(tmp_path / "l.SID_FEM"))
+    told = exported(capsys, str(modal), "-o", str(tmp_path / "l.SID_FEM"))
+    assert "18 modes, in which root rests" in told
+    assert "left out" not in told  # no recovery in that file
+    bimetal = ROOT / "data" / "thermal" / "links" / "bimetal.toml"
+    assert "left out: stress" in exported(capsys, str(bimetal), "-o", str(tmp_path / "b.sid_fem"))
     other = tmp_path / "mine.SID_FEM"
     other.write_text("    3   3    :No. nodes, No. modes\n", encoding="ascii")
     assert "no .sid_fem file that erls wrote" in exported(capsys, str(modal), "-o", str(other), code=2)
