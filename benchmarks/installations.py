@@ -38,9 +38,8 @@ def run(*words: str | Path, folder: Path | None = None, settings: Mapping[str, s
     """Processor time [s]; what fails ends the benchmark with what it said."""
     before = resource.getrusage(resource.RUSAGE_CHILDREN)
     own = {key: value for key, value in os.environ.items() if not key.startswith(("ERLS_", "PYTHON"))}
-    done = subprocess.run(
-        [str(word) for word in words], cwd=folder, env={**own, **(settings or {})}, capture_output=True, text=True
-    )
+    command, env = [str(word) for word in words], {**own, **(settings or {})}
+    done = subprocess.run(command, cwd=folder, env=env, capture_output=True, encoding="utf-8")
     if done.returncode:
         sys.exit(f"{' '.join(map(str, words))}\n{done.stdout}{done.stderr}")
     after = resource.getrusage(resource.RUSAGE_CHILDREN)
@@ -50,7 +49,7 @@ def run(*words: str | Path, folder: Path | None = None, settings: Mapping[str, s
 def weight(python: Path) -> tuple[float, dict[str, float]]:
     """What the packages of an environment weigh without byte code, and the heaviest of them [MB]."""
     asked = [str(python), "-c", "import sysconfig; print(sysconfig.get_path('purelib'))"]
-    folder = Path(subprocess.run(asked, capture_output=True, text=True, check=True).stdout.strip())
+    folder = Path(subprocess.run(asked, capture_output=True, encoding="utf-8", check=True).stdout.strip())
     sizes = dict[str, float]()
     for path in folder.rglob("*"):
         top = path.relative_to(folder).parts[0]
@@ -75,7 +74,7 @@ def checked_types(python: Path, folder: Path) -> str:
     (folder / "use.py").write_text(re.sub(r"  # type: ignore.*", "", text), encoding="utf-8")
     options = ["--python-executable", str(python), "--cache-dir", str(folder / "mypy")]
     words = [sys.executable, "-m", "mypy", *options, "use.py"]
-    told = subprocess.run(words, cwd=folder, capture_output=True, text=True).stdout
+    told = subprocess.run(words, cwd=folder, capture_output=True, encoding="utf-8").stdout
     found = [int(line) for line in re.findall(r"^use\.py:(\d+): error", told, flags=re.MULTILINE)]
     if found != marked:
         sys.exit(f"mypy with {python} found {found}, and not {marked}:\n{told}")
@@ -99,7 +98,7 @@ def row(interpreter: str, wheel: Path, lowest: bool) -> tuple[str, ...]:
         first, *times = [run(scripts / "erls", *c.split(), folder=folder / "work", settings=settings) for c in COMMANDS]
         again = run(scripts / "erls", *COMMANDS[1].split(), folder=folder / "work", settings=settings)
         assert (folder / "work/r.png").stat().st_size > 10_000
-        version = subprocess.run([python, "-V"], capture_output=True, text=True, check=True).stdout.split()[1]
+        version = subprocess.run([python, "-V"], capture_output=True, encoding="utf-8", check=True).stdout.split()[1]
         seconds = [f"{t:.1f}" for t in (first, *times, again)]
         return version, "lowest" if lowest else "newest", f"{total:.0f}", *seconds, checked_types(python, folder)
 

@@ -124,8 +124,8 @@ def nodal() -> None:
 
 RUNS = ("erls", "nodal")
 FINEST = 16
-"""Steps of compared runs between two knots: four would leave 3 to 8 µm in those of the parallel robot, more than models
-are apart there."""
+"""Steps of compared runs between two knots: four would leave 3 to 8 µm in those of the parallel robot, more than its
+models are apart."""
 
 
 def spent(*changes: str) -> tuple[float, int]:

@@ -25,15 +25,15 @@ def export(
 
     Of a modal file: a superelement, six dofs for each interface and modal coordinates (Craig-Bampton). Of a link
     description: mass and stiffness of the full model. SI units; a link description that reads the files is written
-    beside them. Of either, for exudyn: a reduced body. Of a scene: a co-simulation unit (FMU).
+    beside them. Of either: a reduced body for exudyn, or standard input data (SID). Of a scene: a co-simulation unit.
 
     Parameters
     ----------
     source
         Modal file (.h5), link description or scene (.toml).
     output
-        Main file; its suffix names the format: .op4, .pch (DMIG), .mtx (Matrix Market), .mat, .hdf5 (exudyn); .fmu of a
-        scene.
+        Main file; its suffix names the format: .op4, .pch (DMIG), .mtx (Matrix Market), .mat, .hdf5 (exudyn),
+        .SID_FEM; .fmu of a scene.
     format
         nastran-op4, nastran-dmig, matrix-market, mat or abaqus, instead of what the suffix says.
     fmi
@@ -59,7 +59,7 @@ def export(
         from erls.cli.reports import bad
 
         raise bad("is for units of scenes", "--set" if set_ else "--fmi", str(output), "end the output in .fmu")
-    if output.suffix.lower() == ".hdf5" and not format:
+    if output.suffix.lower() in (".hdf5", ".sid_fem") and not format:
         return _body(source, output, force, json)
     form = chosen_format(output, format)
     if source.suffix.lower() == ".toml":
@@ -106,7 +106,7 @@ def _unit(source: Path, output: Path, version: int, changes: list[str], force: b
 
 
 def _body(source: Path, output: Path, force: bool, json: bool) -> None:
-    """A link as a body of exudyn."""
+    """A link as a body of exudyn, or as standard input data."""
     from erls.files.results import claim
     from erls.scene.build import cache_folder
     from erls.scene.inputs import files_of_link
@@ -114,19 +114,31 @@ def _body(source: Path, output: Path, force: bool, json: bool) -> None:
     from fe_import.description.link import load_link
     from fe_import.modal.file import read_modal_file
     from fe_import.writers.exudyn import write_exudyn
+    from fe_import.writers.sid import write_sid
 
+    kind = output.suffix.lower()
     if source.suffix.lower() == ".toml":
         description = load_link(source)
-        claim(output, ".hdf5", files_of_link(description), force)
+        claim(output, kind, files_of_link(description), force)
         model, _ = reduce_cached(description, cache_folder(), tell)
     else:
-        claim(output, ".hdf5", [source], force)
+        claim(output, kind, [source], force)
         model = read_modal_file(source)
-    content = write_exudyn(output, model)
-    points = {name: [int(n) for n in numbers] for name, numbers in content["interfaces"].items()}
-    if json:
+    if kind == ".hdf5":
+        content = write_exudyn(output, model)
         count = int(content["infoList"][0])
-        return print_json({"link": model.name, "modes": count, "interfaces": points, "files": [str(output)]})
-    print(f"{model.name}: {content['infoList'][0]} modes, in which {model.interface_nodes[0].name} rests")
-    print("points around interfaces: " + ", ".join(f"{name} {n[0]} to {n[-1]}" for name, n in points.items()))
+        points = {name: [int(n) for n in numbers] for name, numbers in content["interfaces"].items()}
+        found: dict[str, object] = {"interfaces": points}
+        places = "points around interfaces: " + ", ".join(f"{name} {n[0]} to {n[-1]}" for name, n in points.items())
+    else:
+        nodes = write_sid(output, model)
+        count = model.elastic_modes
+        found = {"nodes": nodes, "left_out": [] if model.recovery is None else ["sigma"]}
+        places = "nodes: " + ", ".join(f"{name} is {number}" for name, number in nodes.items())
+    if json:
+        return print_json({"link": model.name, "modes": count, **found, "files": [str(output)]})
+    print(f"{model.name}: {count} modes, in which {model.interface_nodes[0].name} rests")
+    print(places)
+    if found.get("left_out"):
+        print("left out: stress and section forces, sigma")
     print(f"written: {output}")

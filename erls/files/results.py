@@ -41,6 +41,7 @@ _BEGINS = {
     ".txt": b"#",
     ".pch": b"$",
     ".inp": b"**",
+    ".sid_fem": b" ",
     ".op4": b"\x18",  # has no place for a mark
 }
 _TABLE = re.compile(

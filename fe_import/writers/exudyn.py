@@ -19,13 +19,13 @@ from typing import Any
 
 import h5py
 import numpy as np
-import scipy.linalg as la
 
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.hdf5.files import write_array, write_atomically, write_attribute, write_strings
 from fe_import.modal.model import ModalModel
 from fe_import.model import Array
 from fe_import.writers.base import MARK
+from fe_import.writers.resting import resting_body
 
 AROUND = 6
 """Points around an interface."""
@@ -50,13 +50,10 @@ def exudyn_body(model: ModalModel) -> dict[str, Any]:
     FEImportError
         ``MODE_COUNT``: no elastic mode.
     """
-    basis = _resting(model)
-    inertia, count = model.invariants, basis.shape[1]
+    body = resting_body(model, "a body of exudyn")
+    basis, count = body.basis, body.basis.shape[1]
     nodes, shapes, around = _points(model)
-    moved, turned = inertia.rigid[:, :3], inertia.rigid[:, 3:]
-    x = np.einsum("ij,ajk,kl->ail", basis.T, inertia.X, basis)  # axis, row, column
-    z = np.einsum("ij,abjk,kl->iabl", basis.T, inertia.Z, basis)
-    x_moved, x_turned = (np.einsum("ji,bjk,kl->ilb", rho, inertia.X, basis) for rho in (moved, turned))
+    moved, turned = body.mixed[:, :3], body.mixed[:, 3:]  # axis, row, mode
     whole = model.mass_properties
     return {
         "fileVersion": 1,
@@ -67,19 +64,19 @@ def exudyn_body(model: ModalModel) -> dict[str, Any]:
         "xRef": nodes.ravel(),
         "trigList": model.triangles,
         "postProcessingModes": {},
-        "massMatrixReduced": basis.T @ inertia.m @ basis,
-        "stiffnessMatrixReduced": basis.T @ model.stiffness @ basis,
+        "massMatrixReduced": body.mass,
+        "stiffnessMatrixReduced": body.stiffness,
         "totalMass": whole.mass,
         "Mtt": whole.mass * np.eye(3),
         "chiU": whole.centre_of_mass,
         "chiUtilde": np.cross(whole.centre_of_mass, np.eye(3)).T,
-        "inertiaLocal": turned.T @ inertia.m @ turned,
-        "mPhitTPsi": moved.T @ inertia.m @ basis,
-        "mXRefTildePsi": -turned.T @ inertia.m @ basis,
-        "mPsiTildePsi": -x.transpose(2, 0, 1).reshape(3 * count, count),
-        "mPhitTPsiTilde": -x_moved.reshape(3, 3 * count),
-        "mXRefTildePsiTilde": x_turned.reshape(3, 3 * count),
-        "mPsiTildePsiTilde": z.transpose(0, 1, 3, 2).reshape(3 * count, 3 * count),
+        "inertiaLocal": body.rigid[3:, 3:],
+        "mPhitTPsi": body.coupling[:3],
+        "mXRefTildePsi": -body.coupling[3:],
+        "mPsiTildePsi": -body.first.transpose(2, 0, 1).reshape(3 * count, count),
+        "mPhitTPsiTilde": -moved.transpose(1, 2, 0).reshape(3, 3 * count),
+        "mXRefTildePsiTilde": turned.transpose(1, 2, 0).reshape(3, 3 * count),
+        "mPsiTildePsiTilde": body.second.transpose(2, 0, 3, 1).reshape(3 * count, 3 * count),
         "interfaces": around,
     }
 
@@ -109,17 +106,6 @@ def _fill(group: h5py.Group, content: dict[str, Any]) -> None:
         else:
             write_array(group, name, value, "SI", "")
         group[name].attrs["datatype"] = kind  # of any length: exudyn takes others for bytes
-
-
-def _resting(model: ModalModel) -> Array:
-    """(m, k) modes in which the first interface rests, orthonormal, in rising frequency."""
-    moved, turned = model.node_shape(model.interface_nodes[0].node)
-    held = la.null_space(np.concatenate([moved, np.zeros((0, model.modes)) if turned is None else turned]))
-    if not held.shape[1]:
-        message, remedy = "a body of exudyn needs an elastic mode", "keep some, or use a rigid body there"
-        raise FEImportError(Cause.MODE_COUNT, message, where=model.name, value=0, limit=1, remedy=remedy)
-    _, modes = la.eigh(held.T @ model.stiffness @ held, held.T @ model.invariants.m @ held)
-    return np.asarray(held @ modes)
 
 
 def _points(model: ModalModel) -> tuple[Array, Array, dict[str, Any]]:

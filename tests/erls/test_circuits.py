@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import random
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 import scipy.linalg as la
+from resumed_runs import chunks_of, equal
+from test_resume import at_every_look, stopped
 
 import erls
 from erls.errors import SceneError
+from erls.run.checkpoints import Checkpoints, read_checkpoint
 
 INERTIA, OHM, HENRY, CONSTANT, GEAR, VOLT = 0.02, 1.2, 3e-3, 0.05, 10.0, 6.0
 G = GEAR * CONSTANT
@@ -135,6 +139,21 @@ def test_a_flexible_arm_agrees_between_formulations() -> None:
     currents = [run.sensor("current", [0.05, 0.15]) for run in runs]
     np.testing.assert_allclose(currents[1], currents[0], rtol=1e-3)
     np.testing.assert_allclose(runs[1].position("hand", 0.15), runs[0].position("hand", 0.15), atol=2e-5)
+
+
+@pytest.mark.parametrize("settings", [{}, {"integrator": "generalized_alpha", "step": 1e-3}])
+def test_currents_go_on_through_the_file(
+    settings: dict[str, Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A run that was stopped and resumed is that of one go, bit for bit."""
+    at_every_look(monkeypatch)
+    chunks_of(random.Random(4), monkeypatch)
+    scene, path = tmp_path / "scene.toml", tmp_path / "r.partial"
+    erls.save_scene(scene, axis(STEP, duration=0.02, **settings))
+    whole = erls.simulate(scene, verdict=False)
+    assert stopped(scene, path, 4) > 0
+    run = erls.simulate(scene, checkpoint=Checkpoints(path, saved=read_checkpoint(path)), verdict=False)
+    assert equal(run.solution, whole.solution)
 
 
 @pytest.mark.parametrize(

@@ -77,3 +77,23 @@ def test_a_body_for_exudyn(modal: Path, tmp_path: Path, capsys: pytest.CaptureFi
     assert told[0]["interfaces"]["tip"] == list(range(47, 53))
     shutil.copy(modal, tmp_path / "mine.hdf5")
     assert "no .hdf5 file that erls wrote" in exported(capsys, str(modal), "-o", str(tmp_path / "mine.hdf5"), code=2)
+
+
+def test_standard_input_data(modal: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """Of a modal file and of the description that it came from, alike; earlier ones are replaced, others are not."""
+    texts = []
+    for source in (modal, LINK):
+        told = json.loads(exported(capsys, str(source), "-o", str(tmp_path / "l.SID_FEM"), "--json"))
+        assert (told["modes"], told["nodes"]["root"], told["nodes"]["tip"]) == (18, 1, 2)
+        texts.append((tmp_path / "l.SID_FEM").read_text("ascii"))
+    assert texts[0] == texts[1]
+    told = exported(capsys, str(modal), "-o", str(tmp_path / "l.SID_FEM"))
+    assert "18 modes, in which root rests" in told
+    assert "left out" not in told  # no recovery in that file
+    bimetal = ROOT / "data" / "thermal" / "links" / "bimetal.toml"
+    assert "left out: stress" in exported(capsys, str(bimetal), "-o", str(tmp_path / "b.sid_fem"))
+    other = tmp_path / "mine.SID_FEM"
+    other.write_text("    3   3    :No. nodes, No. modes\n", encoding="ascii")
+    assert "no .sid_fem file that erls wrote" in exported(capsys, str(modal), "-o", str(other), code=2)
+    assert "no folder" in exported(capsys, str(modal), "-o", str(tmp_path / "nowhere" / "l.sid_fem"), code=2)
+    assert "is for units of scenes" in exported(capsys, str(modal), "-o", str(other), "--fmi", "2", code=2)

@@ -53,7 +53,7 @@ to_node = "tip"
 """
 
 
-def _carriages(tmp_path: Path, drives: tuple[str, ...] = ("lower", "upper"), **masses: float) -> Inversion:
+def _carriages(tmp_path: Path, masses: dict[str, float], drives: tuple[str, ...] = ("lower", "upper")) -> Inversion:
     """On one rail, each on top of the one before; ``beside`` from the ground, and held to the upper one by a loop."""
     scene = tmp_path / "carriages.toml"
     parts = [CARRIAGE.format(name=name, mass=mass, point=POINT) for name, mass in masses.items()]
@@ -71,7 +71,7 @@ def test_a_carriage_recoils(tmp_path: Path, masses: dict[str, float]) -> None:
     u₁ = 0, s₁ = -m₂/m₁ x: momentum is kept. The motion of degree 9 is among the laws, so that only rounding is left.
     The same where a loop holds a part of m₂ that goes on its own rail.
     """
-    found = _carriages(tmp_path, **masses)
+    found = _carriages(tmp_path, masses)
     assert np.abs(found.efforts["upper"]).max() == pytest.approx(7.8, abs=0.1)
     assert np.abs(found.efforts["lower"]).max() < 1e-8
     assert found.angles["lower"][-1] == pytest.approx(-0.15, abs=1e-9)
@@ -101,5 +101,5 @@ def test_no_motion_beside_it_takes_less() -> None:
 def test_drives_that_loops_leave_no_motion_are_refused(tmp_path: Path) -> None:
     """Three carriages that a loop holds to each other move in two ways, however many of them are driven."""
     with pytest.raises(SceneError, match=r"more drives \(lower, upper, beside\) than motions") as caught:
-        _carriages(tmp_path, drives=("lower", "upper", "beside"), lower=2.0, upper=0.25, beside=0.75)
+        _carriages(tmp_path, {"lower": 2.0, "upper": 0.25, "beside": 0.75}, ("lower", "upper", "beside"))
     assert (caught.value.value, caught.value.limit) == (3, 2)
