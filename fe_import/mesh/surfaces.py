@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import stat
+from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
@@ -20,6 +21,8 @@ _STL = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute",
 
 def read_surface(path: Path, most: int | None = MOST_TRIANGLES) -> Surface:
     """Read the faces of a file, polygons cut into triangles; triangles without area are left out.
+
+    What this process has read lately, for the variants of a study, is shared while the file keeps its size and time.
 
     Parameters
     ----------
@@ -50,8 +53,23 @@ def read_surface(path: Path, most: int | None = MOST_TRIANGLES) -> Surface:
     if status.st_size > _MOST_BYTES:
         message, limit = "too large for a surface that is only drawn", f"{_MOST_BYTES} bytes"
         raise FEImportError(Cause.NOT_READABLE, message, where=where, value=status.st_size, limit=limit, remedy=remedy)
+    if most is None:
+        return _read(path, most)
+    return _lately(path.absolute(), most, status.st_size, status.st_mtime_ns)
+
+
+@lru_cache(maxsize=64)
+def _lately(path: Path, most: int, size: int, time: int) -> Surface:
+    """Keyed by what tells that a file was replaced."""
+    surface = _read(path, most)
+    surface.points.setflags(write=False)
+    surface.triangles.setflags(write=False)
+    return surface
+
+
+def _read(path: Path, most: int | None) -> Surface:
     points, triangles = _obj(path) if path.suffix.lower() == ".obj" else _stl(path)
-    return sound(points, triangles, where, most)
+    return sound(points, triangles, str(path), most)
 
 
 def sound(points: Array, triangles: IntArray, where: str, most: int | None = MOST_TRIANGLES) -> Surface:
