@@ -96,6 +96,7 @@ def test_notebooks_give_what_they_show(path: Path, tmp_path: Path, monkeypatch: 
     copy.mkdir(parents=True)
     shutil.copytree(ROOT / "data/robot", tmp_path / "data/robot")
     monkeypatch.chdir(copy)
+    matplotlib.pyplot.close("all")  # what other tests have drawn
     names: dict[str, Any] = {}
     cells = [cell for cell in json.loads(path.read_text(encoding="utf-8"))["cells"] if cell["cell_type"] == "code"]
     assert sum(bool(cell["outputs"]) for cell in cells) >= 3

@@ -63,5 +63,7 @@ def reading_curves(sensors: Sequence[Sensor], seen: Seen, count: int) -> dict[st
 
 def reading_samples(sensors: Sequence[Sensor], seen: Seen, count: int) -> list[dict[str, Any]]:
     """Readings by name at each time, numbers or lists of them."""
+    if not count:  # no motion to read
+        return []
     found = {sensor.name: shaped(sensor, seen, (count,)).tolist() for sensor in sensors}
     return [{name: values[k] for name, values in found.items()} for k in range(count)]
