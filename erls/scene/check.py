@@ -15,7 +15,7 @@ from erls.scene.check_sensors import check_sensors
 from erls.scene.check_servo import check_plan, check_servo
 from erls.scene.check_settings import check_settings
 from erls.scene.check_sticking import check_sticking
-from erls.scene.checks import bad, check_joint_fields, check_names, check_tables, directed, not_negative
+from erls.scene.checks import bad, check_ends, check_joint_fields, check_names, check_tables, directed, not_negative
 from erls.scene.contacts import WORLD, Contact
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
@@ -334,18 +334,7 @@ def _check_compound(scene: SceneRecord, place: str) -> None:
 def _check_loop(loop: Loop, scene: SceneRecord, place: str) -> None:
     links = [link.name for link in scene.links]
     choose(loop.type, HOLDING_TYPES, f"{place}.type", SceneError)
-    choose(loop.link, links, f"{place}.link", SceneError)
-    if loop.to_link:
-        choose(loop.to_link, links, f"{place}.to_link", SceneError)
-    if loop.to_link == loop.link:
-        message = "a loop closes between two links, or a link and the ground"
-        raise bad(f"{place}.to_link", message, loop.to_link, "name another link, or leave it out for the ground")
-    if bool(loop.to_link) != bool(loop.to_node):
-        remedy = "give both 'to_link' and 'to_node', or neither for the ground"
-        raise bad(f"{place}.to_node", "a link and a node belong together", loop.to_node, remedy)
-    if loop.to_link and loop.position is not None:
-        message = "between two links the nodes say where the joint is"
-        raise bad(f"{place}.position", message, loop.position, "remove it")
+    check_ends(loop, links, place, "a loop closes between")
     check_joint_fields(loop, loop.type, place)
     kind = JOINT_TYPES[loop.type]
     if loop.axis is None and kind.slides:

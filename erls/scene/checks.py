@@ -11,6 +11,7 @@ from erls.errors import Cause, SceneError
 from erls.mechanism.joint_types import JOINT_TYPES, OWN_FIELDS
 from erls.mechanism.place import LARGEST, LATEST
 from erls.scene.records import Record, SceneTables, Stepping
+from fe_import.files.toml import choose
 
 MOST_STEPS = 100_000_000  # fill any memory; more are a slip
 SHORTEST = 1e-9  # s, a thousand times what separates two breakpoints
@@ -53,6 +54,38 @@ def check_names(places: Iterable[tuple[str, str]]) -> None:
         if name in seen:
             raise bad(place, "names must differ", name, "rename one")
         seen.add(name)
+
+
+def check_ends(end: Any, links: list[str], place: str, what: str) -> None:
+    """Of what connects a link with another one or with the ground.
+
+    Parameters
+    ----------
+    end : Loop or Bushing
+    links : list of str
+        Names of those that there are.
+    place : str
+        ``FILE: loops[0]``
+    what : str
+        Subject and verb of the message, "a loop closes between".
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD, BAD_REFERENCE: naming file, field, value and remedy.
+    """
+    choose(end.link, links, f"{place}.link", SceneError)
+    if end.to_link:
+        choose(end.to_link, links, f"{place}.to_link", SceneError)
+    if end.to_link == end.link:
+        message = f"{what} two links, or a link and the ground"
+        raise bad(f"{place}.to_link", message, end.to_link, "name another link, or leave it out for the ground")
+    if bool(end.to_link) != bool(end.to_node):
+        remedy = "give both 'to_link' and 'to_node', or neither for the ground"
+        raise bad(f"{place}.to_node", "a link and a node belong together", end.to_node, remedy)
+    if end.to_link and end.position is not None:
+        message = "between two links the nodes say where it is"
+        raise bad(f"{place}.position", message, end.position, "remove it")
 
 
 def check_joint_fields(joint: Record, kind: str, place: str) -> None:
