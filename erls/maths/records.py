@@ -18,7 +18,7 @@ The numbers may be real or complex: a record of complex numbers is read by the s
 
 from __future__ import annotations
 
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Sequence
 from functools import cache, lru_cache, partial
 from typing import Annotated, Any, NamedTuple, TypeVar, get_type_hints
 
@@ -178,29 +178,43 @@ class Memory:
 
     def put(self, record: NamedTuple) -> int:
         """Store a record; the place of its table."""
+        return self.put_all([record])
+
+    def put_all(self, records: Sequence[NamedTuple]) -> int:
+        """Store records of one type; the place of the first table, -1 without any.
+
+        Tables follow each other, as long as that of one record each, and what lies in the integers themselves follows
+        the last of them: functions find the k-th table by that length.
+        """
+        if len({type(record) for record in records}) > 1:
+            raise ValueError("records that follow each other are of one type")
         at = len(self.integers)
-        table: list[int] = []
-        whole: list[tuple[int, IntArray]] = []  # places in the table of what lies in the integers themselves
+        tables: list[int] = []
+        whole: list[tuple[int, IntArray]] = []  # places in the tables of what lies in the integers themselves
+        for record in records:
+            self._add(record, tables, whole)
+        self.integers += tables
+        for place, array in whole:
+            self.integers[at + place] = len(self.integers)
+            self.integers += [int(i) for i in array.ravel()]
+        return at if records else -1
+
+    def _add(self, record: NamedTuple, tables: list[int], whole: list[tuple[int, IntArray]]) -> None:
         for value, (name, axes, is_whole) in zip(record, _fields(type(record)), strict=True):
             if axes is None:
-                table.append(int(value))
+                tables.append(int(value))
                 continue
             array = np.asarray(value)
             if array.ndim != axes:
                 raise ValueError(f"{type(record).__name__}.{name} has {array.ndim} axes instead of {axes}")
             if is_whole:
-                whole.append((len(table), array))
-                table += [0, *array.shape]
+                whole.append((len(tables), array))
+                tables += [0, *array.shape]
                 continue
             flat = np.ascontiguousarray(array, dtype=float).ravel()
-            table += [self._size, *array.shape]
+            tables += [self._size, *array.shape]
             self._parts.append(flat)
             self._size += len(flat)
-        self.integers += table
-        for place, array in whole:
-            self.integers[at + place] = len(self.integers)
-            self.integers += [int(i) for i in array.ravel()]
-        return at
 
     @property
     def numbers(self) -> Array:

@@ -64,6 +64,29 @@ def test_a_step_of_the_voltage(formulation: str, integrator: str) -> None:
     assert run.trust.verdict == "good"
 
 
+@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+def test_motors_on_one_gear(formulation: str) -> None:
+    """Two axes whose discs a belt ties, the second without a battery: the three linear equations, to the tolerance."""
+    ratio, one = 0.5, axis(STEP)
+    body = {"mass": 1.0, "inertia": [0.0, 0.0, INERTIA], "points": {"seat": [0.0, 0.0, 0.0]}}
+    other = {"name": "other", "dh": {"convention": "standard"}, "on": "ground", "branch": {"position": [0.3, 0.0, 0.0]}}
+    scene = erls.make_scene(
+        gravity=[0.0, 0.0, 0.0],
+        simulation={"duration": 0.1, "formulation": formulation},
+        joints=[one.record.joints[0], {**other, "motor": CIRCUIT}],
+        links=[{"name": name, "rigid": body} for name in ("disc", "second")],
+        couplings=[{"name": "belt", "joint": "other", "follows": {"axis": ratio}}],
+    )
+    run = erls.simulate(scene, verdict=False)
+    whole, inertia = np.zeros((4, 4)), INERTIA * (1 + ratio**2)
+    whole[0] = [-OHM / HENRY, 0.0, -G / HENRY, VOLT / HENRY]
+    whole[1, 1:3] = -OHM / HENRY, -G * ratio / HENRY
+    whole[2, :2] = G / inertia, G * ratio / inertia
+    expected = la.expm(0.1 * whole)[:3, 3]
+    found = [run.joint_rate(name, 0.1) for name in ("axis charge", "other charge", "axis")]
+    np.testing.assert_allclose(found, expected, rtol=0, atol=2e-4 * VOLT / OHM)
+
+
 def test_a_motor_at_its_end_speed_takes_no_current() -> None:
     """The back-EMF is the whole voltage; a motor that is held has V / R after some L / R."""
     free = erls.simulate(axis(STEP, duration=2.0), verdict=False)

@@ -13,7 +13,7 @@ import erls
 from erls.errors import SceneError
 
 DH = {"convention": "standard"}
-MOTOR, WHEEL, RATIO, TORQUE = 0.02, 0.05, -2.5, 0.3  # kg m², wheel per motor, N m
+MOTOR, WHEEL, IDLER, RATIO, TORQUE = 0.02, 0.05, 0.004, -2.5, 0.3  # kg m², wheel per motor, N m
 REDUCED = 1 / (RATIO**2 / MOTOR + 1 / WHEEL)  # what the teeth of an elastic gear swing, at the wheel
 DUE = 8.0 * math.pi
 
@@ -25,18 +25,19 @@ def shaft(name: str, inertia: float, **more: Any) -> tuple[dict[str, Any], dict[
     return joint, {"name": f"{name} rotor", "rigid": body}
 
 
-def geared(
-    coupling: dict[str, Any], shafts: list[tuple[dict[str, Any], dict[str, Any]]] | None = None, **settings: Any
-) -> Any:
-    """A scene of two rotors, the first driven, that a gear couples."""
-    drive = {"type": "torque", "profiles": [{"shape": "constant", "value": TORQUE}]}
-    own = shafts or [shaft("motor", MOTOR, drive=drive), shaft("wheel", WHEEL)]
+DRIVE = {"type": "torque", "profiles": [{"shape": "constant", "value": TORQUE}]}
+Shafts = list[tuple[dict[str, Any], dict[str, Any]]]
+
+
+def geared(coupling: dict[str, Any], shafts: Shafts | None = None, *before: dict[str, Any], **settings: Any) -> Any:
+    """A scene of two rotors, the first driven, that a gear couples; of others with what couples them."""
+    own = shafts or [shaft("motor", MOTOR, drive=DRIVE), shaft("wheel", WHEEL)]
     return erls.make_scene(
         gravity=[0.0, 0.0, 0.0],
         simulation={"duration": 0.5, **settings},
         joints=[joint for joint, _ in own],
         links=[link for _, link in own],
-        couplings=[{"name": "gear", "joint": "wheel", "follows": {"motor": RATIO}, **coupling}],
+        couplings=[*before, {"name": "gear", "joint": "wheel", "follows": {"motor": RATIO}, **coupling}],
     )
 
 
@@ -50,6 +51,23 @@ def test_two_geared_rotors_are_one_of_the_equivalent_inertia(formulation: str, i
     np.testing.assert_allclose(run.joint_angle("motor", times), acceleration * times**2 / 2, rtol=1e-8)
     np.testing.assert_allclose(run.joint_angle("wheel", times), RATIO * run.joint_angle("motor", times), rtol=1e-12)
     np.testing.assert_allclose(run.coupling_effort("gear", times), WHEEL * RATIO * acceleration, rtol=1e-8)
+
+
+@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+@pytest.mark.parametrize("last", [{}, {"stiffness": 1e5, "damping": 20.0}], ids=["ideal", "elastic"])
+def test_a_train_of_gears(formulation: str, last: dict[str, Any]) -> None:
+    """J = J₁ + r² J₂ + (r s)² J₃ at the motor: a coupling whose joint another one follows, and which is told first; an
+    elastic one follows in the mean of what its teeth swing, which its damping has ended.
+    """
+    second = {"name": "second", "joint": "idler", "follows": {"wheel": 3.0}, **last}
+    shafts = [shaft("motor", MOTOR, drive=DRIVE), shaft("wheel", WHEEL), shaft("idler", IDLER)]
+    run = erls.simulate(geared({}, shafts, second, formulation=formulation), verdict=False)
+    acceleration = TORQUE / (MOTOR + RATIO**2 * WHEEL + (3 * RATIO) ** 2 * IDLER)
+    motor = run.joint_angle("motor", 0.5)
+    assert motor == pytest.approx(acceleration * 0.5**2 / 2, rel=1e-3 if last else 1e-8)
+    wound = IDLER * 3 * RATIO * acceleration / last.get("stiffness", np.inf)
+    assert run.joint_angle("idler", 0.5) == pytest.approx(3 * RATIO * motor - wound, rel=1e-5)
+    assert run.coupling_effort("second", 0.5) == pytest.approx(IDLER * 3 * RATIO * acceleration, rel=1e-3)
 
 
 @pytest.mark.parametrize("formulation", ["erls", "ffr"])

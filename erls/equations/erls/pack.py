@@ -97,9 +97,7 @@ def shapes(mechanism: Mechanism) -> list[Shapes]:
     return result
 
 
-def _link(
-    link: Link, modes: Array, axes: Array, out: Array, vectors: Array, before: Array, parent: int
-) -> own.Link:
+def _link(link: Link, modes: Array, axes: Array, out: Array, vectors: Array, before: Array, parent: int) -> own.Link:
     """Constants of a link; ``vectors`` are its decoupled coordinates, ``before`` those of its parent."""
     mass = modes.T @ link.invariants.m @ modes
     x = modes.T @ np.einsum("ca,aij->cij", axes, link.invariants.X) @ modes
@@ -190,17 +188,16 @@ def _bends(
         kept(_warp, link, found[k].modes[:, 6:]) if bends[k].warped else warp_record(None)
         for k, link in enumerate(links)
     ]
-    places["bends"] = pack.put_all(constants, bends)
-    places["seats"] = pack.put_all(constants, seats)
-    places["warps"] = pack.put_all(constants, warps)
+    places["bends"] = constants.put_all(bends)
+    places["seats"] = constants.put_all(seats)
+    places["warps"] = constants.put_all(warps)
     before = [modes[parent] if parent >= 0 else 0 for parent in mechanism.parents]
     states = [_bend_state(modes[k], before[k], len(axes[k])) for k in count]
-    places["bend_states"] = pack.put_all(scratch, states)
-    places["seat_states"] = pack.put_all(
-        scratch, [node_state(seat.shapes.shape[1], len(seat.second_order) > 0) for seat in seats]
-    )
-    places["warp_states"] = pack.put_all(scratch, [warp_state(modes[k] * bends[k].warped) for k in count])
-    places["changes"] = pack.put_all(scratch, [_change(modes[k]) for k in count])
+    places["bend_states"] = scratch.put_all(states)
+    seated = [node_state(seat.shapes.shape[1], len(seat.second_order) > 0) for seat in seats]
+    places["seat_states"] = scratch.put_all(seated)
+    places["warp_states"] = scratch.put_all([warp_state(modes[k] * bends[k].warped) for k in count])
+    places["changes"] = scratch.put_all([_change(modes[k]) for k in count])
     return places
 
 
@@ -271,43 +268,39 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     vectors = [each.vectors for each in decoupled]
     vectors_before = [vectors[parent] if parent >= 0 else np.zeros((0, 0)) for parent in parents]
     # on the ground a link moves along its joint alone
-    sizes = [
-        6 + (0 if bends else len(axes[k])) if parent >= 0 or curved[k] else 1 for k, parent in enumerate(parents)
-    ]
+    sizes = [6 + (0 if bends else len(axes[k])) if parent >= 0 or curved[k] else 1 for k, parent in enumerate(parents)]
     warped = bends and "modal_inertia" in mechanism.effects
     curved_rows = [6 + warped * modes[k] if curved[k] else 0 for k in range(count)]
     rooms, elimination = _segments(tuple(parents), tuple(sizes), tuple(modes), tuple(curved_rows))
     chain = own.Chain(
-        links=pack.put_all(
-            constants,
+        links=constants.put_all(
             [
                 kept(_link, links[k], found[k].modes, inertial[k], found[k].out, vectors[k], before, parent)
                 for k, (parent, before) in enumerate(zip(parents, vectors_before, strict=True))
             ],
         ),
-        states=pack.put_all(scratch, [_link_state(modes[k], len(inertial[k])) for k in range(count)]),
+        states=scratch.put_all([_link_state(modes[k], len(inertial[k])) for k in range(count)]),
         **(_bends(mechanism, found, axes, constants, scratch) if bends else _UNBENT),
-        segments=pack.put_all(scratch, rooms),
-        condensed=pack.put_all(condensed, elimination),
+        segments=scratch.put_all(rooms),
+        condensed=condensed.put_all(elimination),
         factors=0,
         left=0,
         **pack.effect_flags(mechanism.effects),
         weight=int(bool(np.any(mechanism.gravity))),
         complete=int(complete),
         end_count=len(ends),
-        ends=pack.put_all(constants, [pack.end_record(links[k], found[k].modes, bends, end) for k, end in ends]),
-        end_states=pack.put_all(scratch, [end_state(6 + modes[k]) for k, _ in ends]),
+        ends=constants.put_all([pack.end_record(links[k], found[k].modes, bends, end) for k, end in ends]),
+        end_states=scratch.put_all([end_state(6 + modes[k]) for k, _ in ends]),
     )
     rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
     size, own_name, kind = len(free) + sum(modes), "erls.equations.erls", "stiffened_" if bends else ""
     residual = function_in(f"{own_name}.{kind}residual", "residual")()
     serial = Serial(
         links=count,
-        joints=pack.put_all(constants, joints),
+        joints=constants.put_all(joints),
         joint_states=pack.joint_states(scratch, count),
-        modes=pack.put_all(
-            constants,
-            [pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k]) for k in range(count)],
+        modes=constants.put_all(
+            [pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k]) for k in range(count)]
         ),
         **pack.addresses(mechanism, own.call_loads),
         rigid_links=rigid,

@@ -232,31 +232,29 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
         before = sizes[parents[k]] if parents[k] >= 0 else none
         six = 6 if parents[k] >= 0 else 0
         segments.append(segment(parents[k], 6, sizes[k].modes, six, before.modes, sizes[k].ports, sizes[k].extra))
-    condensed_at = pack.put_all(factors, condensed(segments) if linked else [])
+    condensed_at = factors.put_all(condensed(segments) if linked else [])
     room = Room(np.zeros((size, size)), np.zeros(0))
     if linked:
         room = Room(np.zeros((0, 0)), np.zeros(len(factors.numbers)))
     frames = Frames(
-        bodies=pack.put_all(constants, bodies),
-        body_states=pack.put_all(working, [body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
-        nodes=pack.put_all(constants, pairs),
-        node_states=pack.put_all(working, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in pairs]),
+        bodies=constants.put_all(bodies),
+        body_states=working.put_all([body_state(sizes[k].modes, len(bodies[k].axes)) for k in links]),
+        nodes=constants.put_all(pairs),
+        node_states=working.put_all([node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in pairs]),
         node_count=own_nodes,
         end_count=len(ends),
-        ends=pack.put_all(
-            constants, [_end(pairs[own_nodes + i], own_nodes + i, end) for i, (_, end) in enumerate(ends)]
-        ),
+        ends=constants.put_all([_end(pairs[own_nodes + i], own_nodes + i, end) for i, (_, end) in enumerate(ends)]),
         end_room=working.put(EndRoom(np.zeros(12), np.zeros(6), np.zeros(6))),
-        bent_bodies=pack.put_all(constants, [_bent_body(given, k) for k in links]),
-        bent_states=pack.put_all(working, [bent_state(sizes[k].modes if b.bent else 0) for k, b in enumerate(bodies)]),
-        warps=pack.put_all(constants, [_warp(given, k) for k in links]),
-        warp_states=pack.put_all(working, [warp_state(sizes[k].modes * b.warped) for k, b in enumerate(bodies)]),
+        bent_bodies=constants.put_all([_bent_body(given, k) for k in links]),
+        bent_states=working.put_all([bent_state(sizes[k].modes if b.bent else 0) for k, b in enumerate(bodies)]),
+        warps=constants.put_all([_warp(given, k) for k in links]),
+        warp_states=working.put_all([warp_state(sizes[k].modes * b.warped) for k, b in enumerate(bodies)]),
         bend_link=address_for(records.call_bend_link, bent),
         correct_twist=address_for(records.call_correct_twist, bent),
         bent_forces=address_for(records.call_bent_forces, bent),
         correct_arrival=address_for(records.call_correct_arrival, bent),
-        segments=pack.put_all(working, segments),
-        decoupled=pack.put_all(working, segments if linked else []),
+        segments=working.put_all(segments),
+        decoupled=working.put_all(segments if linked else []),
         condensed=condensed_at,
         room=working.put(room),
         free=free,
@@ -269,9 +267,9 @@ def pack_frames(given: Given, dense: int = DENSE) -> CompiledSystem:
     integers[0] = constants.put(
         Serial(
             links=len(mechanism.links),
-            joints=pack.put_all(constants, joints),
+            joints=constants.put_all(joints),
             joint_states=pack.joint_states(working, len(joints)),
-            modes=pack.put_all(constants, modes),
+            modes=constants.put_all(modes),
             **pack.addresses(mechanism, records.call_floating_loads if given.absolute else records.call_loads),
             rigid_links=rigid_links,
             rigid_states=rigid_states,

@@ -14,7 +14,7 @@ from erls.equations.loops import actuated, held, nearest, system
 from erls.equations.loops import records as own
 from erls.equations.loops.closure import closure
 from erls.equations.loops.rows import Closure, Effort, LoopRows
-from erls.equations.serial.pack import force_record, pose_numbers, put_all
+from erls.equations.serial.pack import force_record, pose_numbers
 from erls.equations.serial.time_curves import put_curve
 from erls.equations.switches.motors import Acting
 from erls.maths.calls import address_of
@@ -319,11 +319,11 @@ def compile_loops(given: Given) -> CompiledLoops:
         conditions=m,
         kept=r,
         gripped=len(given.grips),
-        grips=put_all(constants, [own.GrippedJoint(*grip) for grip in given.grips]) if given.grips else -1,
+        grips=constants.put_all([own.GrippedJoint(*grip) for grip in given.grips]) if given.grips else -1,
         active=int(given.active),
         rotors=int(any(loop.freedom is not None and loop.freedom.rotor_inertia for loop in loops)),
-        first=put_all(constants, [_joint(constants, given, k, loop) for k, loop in enumerate(loops)]),
-        states=put_all(scratch, [own.loop_state(columns, len(found)) for found in rows.conditions]),
+        first=constants.put_all([_joint(constants, given, k, loop) for k, loop in enumerate(loops)]),
+        states=scratch.put_all([own.loop_state(columns, len(found)) for found in rows.conditions]),
         room=scratch.put(own.room(len(ends), columns, n, m, r, len(given.grips))),
         frames=address_of(tree.frames, contract.FRAMES),
         residual=address_of(tree.residual, contract.RESIDUAL),

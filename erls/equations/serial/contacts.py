@@ -125,14 +125,13 @@ def put_contacts(
     """
     own = mechanism.contacts
     records = [Contact(c.position, c.axes, c.law.numbers, c.sliding(mechanism.reach)) for c in own]
-    kept = [constants.put(record) for record in records], [scratch.put(room(ContactState)) for _ in own]
     return {
         "touch": address_for(call_touch, bool(own)),
         "contact_gains": address_for(call_contact_gains, bool(own)),
         "residual": address_of(residual, contract.RESIDUAL) if own else -1,
         "contact_count": len(own),
-        "contacts": kept[0][0] if own else -1,
-        "contact_states": kept[1][0] if own else -1,
+        "contacts": constants.put_all(records),
+        "contact_states": scratch.put_all([room(ContactState) for _ in own]),
         "contact_room": scratch.put(room(ContactRoom, n=size)) if own else -1,
     }
 

@@ -164,8 +164,7 @@ def put_loads(
         "load_states": (scratch, [room(LoadState, n=bases[load.link].shape[1]) for load in own]),
         "load_node_states": (scratch, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in nodes]),
     }
-    found = {name: [memory.put(record) for record in every] for name, (memory, every) in tables.items()}
-    return {"load_count": len(own), **{name: every[0] if every else -1 for name, every in found.items()}}
+    return {"load_count": len(own), **{name: memory.put_all(every) for name, (memory, every) in tables.items()}}
 
 
 def sides_of(contacts: Sequence[PointContact]) -> list[tuple[PointLoad, int, int]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence, Set
+from collections.abc import Set
 from typing import Any
 
 import numpy as np
@@ -116,17 +116,11 @@ def effect_flags(effects: Set[str]) -> dict[str, int]:
     return {field: int(name in effects) for field, name in names.items()}
 
 
-def put_all(memory: Memory, records: Sequence[Any]) -> int:
-    """Records one after the other; the place of the first, -1 without any."""
-    places = [memory.put(record) for record in records]
-    return places[0] if places else -1
-
-
 def joint_states(scratch: Memory, count: int) -> int:
     """Memory for the motion of joints."""
     sizes = {"coordinate": 3, "pose": 12, "screw": 6, "twist": 6, "twist_rate": 6, "feed": 1, "forces": 2}
     room = JointState(**{name: np.zeros(size) for name, size in sizes.items()})
-    return put_all(scratch, [room] * count)
+    return scratch.put_all([room] * count)
 
 
 def end_record(link: Link, modes: Array | None, curved: bool, end: LoopEnd) -> End:
@@ -172,4 +166,4 @@ def rigid_links(mechanism: Mechanism, constants: Memory, scratch: Memory) -> tup
         for joint, link in zip(mechanism.joints, mechanism.links, strict=True)
     ]
     states = [RigidState(np.zeros(12), *(np.zeros(6) for _ in range(4))) for _ in links]
-    return put_all(constants, links), put_all(scratch, states)
+    return constants.put_all(links), scratch.put_all(states)

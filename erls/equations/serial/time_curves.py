@@ -44,8 +44,7 @@ def put_curve(memory: Memory, curve: Curve | None) -> int:
     parts = _parts(curve)
     at = len(memory.integers)
     memory.integers.append(len(parts))
-    for term in parts:
-        memory.put(_record(term))
+    memory.put_all([_record(term) for term in parts])
     return at
 
 

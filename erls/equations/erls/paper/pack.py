@@ -33,7 +33,6 @@ from erls.equations.serial.pack import (
     end_record,
     joint_record,
     joint_states,
-    put_all,
     rigid_links,
     step_parts,
 )
@@ -201,9 +200,9 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
     free = sum(not joint.drive.prescribed for joint in mechanism.joints)
     integers = [0]
     constants, working = Memory(integers), Memory(integers)
-    joints = put_all(constants, _joints(mechanism, constants))
+    joints = constants.put_all(_joints(mechanism, constants))
     states = joint_states(working, links)
-    modes = put_all(constants, _modes(mechanism, free))
+    modes = constants.put_all(_modes(mechanism, free))
     rigid, rigid_states = rigid_links(mechanism, constants, working)
     rows, bodies = joint_rows(mechanism, gauge, curved), _bodies(mechanism)
     bent = [_bent_body(mechanism, link, curved) for link in mechanism.links]
@@ -216,13 +215,13 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         rows=count,
         elastic=elastic,
         free=free,
-        joint_rows=put_all(constants, rows),
-        row_states=put_all(working, [room(RowState, n=r.own.shape[1], n_p=r.previous.shape[1], z=size) for r in rows]),
-        bodies=put_all(constants, bodies),
-        body_states=put_all(working, [_state(body, links, size) for body in bodies]),
-        bent_bodies=put_all(constants, bent),
-        bent_states=put_all(
-            working, [bent_state(b.coupling.shape[1], len(b.coupling) > 0, len(b.warp) > 0) for b in bent]
+        joint_rows=constants.put_all(rows),
+        row_states=working.put_all([room(RowState, n=r.own.shape[1], n_p=r.previous.shape[1], z=size) for r in rows]),
+        bodies=constants.put_all(bodies),
+        body_states=working.put_all([_state(body, links, size) for body in bodies]),
+        bent_bodies=constants.put_all(bent),
+        bent_states=working.put_all(
+            [bent_state(b.coupling.shape[1], len(b.coupling) > 0, len(b.warp) > 0) for b in bent]
         ),
         correct_twist=address_for(call_correct_twist, is_bent),
         bent_forces=address_for(call_bent_forces, is_bent),
@@ -237,8 +236,8 @@ def pack_chain(mechanism: Mechanism, gauge: str) -> CompiledSystem:
         eliminate=address_for(call_eliminate),
         extra_rows=address_for(call_extra_rows, curved),
         end_count=len(ends),
-        ends=put_all(constants, [end_record(mechanism.links[k], None, curved, end) for k, end in ends]),
-        end_states=put_all(working, [end_state(6 + mechanism.links[k].elastic_modes) for k, _ in ends]),
+        ends=constants.put_all([end_record(mechanism.links[k], None, curved, end) for k, end in ends]),
+        end_states=working.put_all([end_state(6 + mechanism.links[k].elastic_modes) for k, _ in ends]),
         curved=int(curved),
         **effect_flags(mechanism.effects),
     )
