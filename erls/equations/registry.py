@@ -8,7 +8,7 @@ a kind of system: one line in `SYSTEMS`, and one in `erls.integrate.choice.INTEG
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple, Protocol, runtime_checkable
+from typing import NamedTuple
 
 from erls.equations.formulation import Formulation, TreeFormulation
 from erls.equations.loops.closed_chain import ClosedChain
@@ -45,20 +45,11 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
     return Nodal(mechanism, settings.elements_per_member, start, rules=rules)
 
 
-@runtime_checkable
-class Sharing(Protocol):
-    """Equations of which others of the same kind can take over what does not depend on where joints start, nor on how
-    large loads are.
-    """
-
-    def share(self, other: Any) -> None:
-        """Take over from these what can be taken over, if anything."""
-
-
 def share(formulation: Formulation, known: Formulation) -> None:
-    """Have a formulation take over what another one has made, as far as they are alike."""
-    if type(formulation) is type(known) and isinstance(formulation, Sharing):
-        formulation.share(known)
+    """Have a formulation take over what another one has made, as far as they are alike and of a kind that can."""
+    take = getattr(formulation, "share", None)
+    if take is not None and type(formulation) is type(known):
+        take(known)
 
 
 def closed_start_of(mechanism: Mechanism) -> ClosedStart:

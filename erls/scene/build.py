@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence, Set
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TypeAlias, TypeVar
@@ -29,7 +29,7 @@ from erls.scene.build_joints import build_joints, stands_on
 from erls.scene.build_loads import build_loads
 from erls.scene.build_loops import build_loops
 from erls.scene.build_substructures import piece_links, piece_models, piece_warnings
-from erls.scene.chain import Scene, SceneRecord
+from erls.scene.chain import Scene
 from erls.scene.interface_gaps import interface_gaps
 from erls.scene.links import Link as LinkRecord
 from fe_import.cache import reduce_cached
@@ -56,7 +56,11 @@ class Built:
     """A mechanism, and what the user should know about how it came about."""
 
     mechanism: Mechanism
-    warnings: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was found while it was built."""
+        return self.mechanism.remarks
 
 
 def cache_folder() -> Path:
@@ -111,7 +115,10 @@ def build_mechanism(
         for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
     ]
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
-    told = remarks(record, rows, links, effects)
+    told = interface_gaps(record, rows, links)
+    told += [f"link {link.name!r}: {text}" for link in links if (text := link.model.provenance.get(KEPT_WHOLE))]
+    told += [w for link in links for w in piece_warnings(link)]
+    told += inconsistencies(effects, record.simulation.formulation)
     points = [_point(scene, k, links) for k in range(len(record.points))]
     whole = expand(rows, _with_payloads(scene, rows, links, points))
     chain = Mechanism(
@@ -126,30 +133,12 @@ def build_mechanism(
         allow_unstable=record.initial.allow_unstable,
         elastic_assembly=record.initial.assemble == "elastic",
         bandwidth=record.simulation.bandwidth,
+        remarks=tuple(told),
     )
     chain, circuits = with_circuits(scene, chain)
     closing = build_loops(scene, chain) + build_bushings(scene, chain) + build_couplings(scene) + circuits
     chain = without(replace(chain, loops=closing, effects=effects), ALL - effects)
-    return Built(chain, told)
-
-
-def remarks(
-    record: SceneRecord, rows: Sequence[Sequence[Joint]], links: Sequence[Link], effects: Set[str]
-) -> tuple[str, ...]:
-    """What the user should know about how a mechanism came about.
-
-    Parameters
-    ----------
-    record : SceneRecord
-    rows : sequence of sequences of Joint
-        The motions of each joint, with their seats.
-    links : sequence of Link
-    effects : set of str
-    """
-    found = interface_gaps(record, rows, links)
-    found += [f"link {link.name!r}: {text}" for link in links if (text := link.model.provenance.get(KEPT_WHOLE))]
-    found += [w for link in links for w in piece_warnings(link)]
-    return (*found, *inconsistencies(effects, record.simulation.formulation))
+    return Built(chain)
 
 
 def link_models(scene: Scene, tell: Message) -> list[ModalModel]:

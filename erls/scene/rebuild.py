@@ -11,7 +11,7 @@ import numpy as np
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joints import Joint
 from erls.mechanism.place import Place
-from erls.scene.build import Built, remarks
+from erls.scene.build import Built
 from erls.scene.build_joints import initial_motion
 from erls.scene.build_loads import build_loads
 from erls.scene.chain import Scene, SceneRecord
@@ -44,15 +44,14 @@ def rebuilt(scene: Scene, before: SceneRecord, mechanism: Mechanism) -> Built | 
         As `erls.scene.build.build_mechanism`.
     """
     now = scene.record
-    if not _alike(now, before) or len(mechanism.joints) != len(now.joints):
+    if len(mechanism.joints) != len(now.joints) or not _alike(now, before):
         return None
     joints = tuple(_started(*both, scene, k) for k, both in enumerate(zip(mechanism.joints, now.joints, strict=True)))
     loads = mechanism.loads
     if now.loads != before.loads:
         numbers: np.ndarray[tuple[int], np.dtype[np.int64]] = np.arange(len(mechanism.links))
         loads = tuple(build_loads(scene, mechanism.links, mechanism.points, numbers))
-    found = replace(mechanism, joints=joints, loads=loads)
-    return Built(found, remarks(now, [[joint] for joint in joints], found.links, found.effects))
+    return Built(replace(mechanism, joints=joints, loads=loads))
 
 
 def _alike(now: SceneRecord, before: SceneRecord) -> bool:

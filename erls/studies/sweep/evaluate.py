@@ -22,9 +22,7 @@ from fe_import.errors import ReportedError
 Reduction = Callable[[Run], Mapping[str, float]]
 """Numbers of a run by name, of one's own; workers import it by its name."""
 
-BENDING_EVERY = 16
-"""Of so many points the first is looked at for how far off links are that bend (`erls.run.watches.deflection_range`),
-where runs do not state their error."""
+_FEW, _OF_FEW, _OF_MANY = 256, 16, 128
 
 _known = threading.local()
 
@@ -95,11 +93,17 @@ def evaluate(task: Task) -> list[Row]:
     return [row_of(task, number, values, run_point(task, number, values)) for number, values in task.rows]
 
 
+def looks_at_bending(number: int) -> bool:
+    """Whether a point is looked at for how far off links are that bend (`erls.run.watches.deflection_range`), where runs
+    do not state their error: one of 16 of the first, one of 128 of the others.
+    """
+    return number % (_OF_FEW if number < _FEW else _OF_MANY) == 0
+
+
 def run_point(task: Task, number: int, values: Sequence[Any]) -> Run | ReportedError:
     """The run of a point, or its failure."""
-    bending = number % BENDING_EVERY == 0
     changes = _varied(task, values)
-    return _variants(task).run((), lambda t, duration: None, task.verdict, bending, changes)
+    return _variants(task).run((), lambda t, duration: None, task.verdict, looks_at_bending(number), changes)
 
 
 def numbers_of(run: Run, quantities: Sequence[str] | Reduction) -> dict[str, float]:
