@@ -68,8 +68,10 @@ def shear_flexibility(element: FrameElement, shear: bool) -> tuple[float, float]
     return e * s.inertia_z / (s.shear_factor_y * g), e * s.inertia_y / (s.shear_factor_z * g)
 
 
-def bending_shapes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
-    """Deflection and rotation of the cross section at ξ = x/L per unit (v₁, θ₁, v₂, θ₂), each (points, 4)."""
+def bending_shapes(xi: Array, length: Array | float, phi: Array | float) -> tuple[Array, Array]:
+    """Deflection and rotation of the cross section at ξ = x/L per unit (v₁, θ₁, v₂, θ₂), each (..., points, 4), of
+    elements with lengths and Φ (..., 1), or of one.
+    """
     x2, x3 = xi**2, xi**3
     bubble = phi / 2 * (xi - x2)
     deflection = np.stack(
@@ -90,7 +92,8 @@ def bending_shapes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
         ],
         axis=-1,
     )
-    return deflection / (1 + phi), slope / (1 + phi)
+    whole = np.asarray(1 + phi)[..., None]
+    return deflection / whole, slope / whole
 
 
 def deflection_slopes(xi: Array, length: float, phi: float) -> Array:

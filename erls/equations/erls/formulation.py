@@ -102,7 +102,7 @@ class Erls(SerialFormulation):
 
     def _found_scales(self) -> Array:
         system, (y, _) = self.compiled, self.undeformed_start()
-        rates = [view for state in self._links(system) for view in (state.w, state.q_rate[6:])]
+        rates = [view for state in self._links(system) for view in (state.w, state.q_rate[6:]) if view.size]
         places = places_within(system.scratch, rates)
         assert places is not None
         v = np.vstack([np.zeros(self.size), np.eye(self.size)[len(self.free_joints) :]])
