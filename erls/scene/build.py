@@ -249,7 +249,7 @@ def link_model(scene: Scene, k: int, tell: Message, description: LinkFile | None
             )
     else:
         given = _within(f"{place}.model", lambda: link_description(scene, link))
-        model, cached = reduce_cached(given, cache_folder(), tell)
+        model, cached = reduce_cached(given, cache_folder(), tell, passing=bool(link.changes))
         tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({given.path.name})")
     model = _warmed(model, link, place)
     wanted = 0 if not link.flexible else link.elastic_modes
