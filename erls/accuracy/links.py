@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.errors import link_errors
 

@@ -24,7 +24,7 @@ def differ_in_numbers(mechanism: Mechanism, known: Mechanism) -> bool:
     """Whether all that two mechanisms differ in is where joints start, and how large loads are: the rest is the same
     objects.
     """
-    pairs = [(mechanism, known, {"joints", "loads"})]
+    pairs: list[tuple[object, object, Set[str]]] = [(mechanism, known, {"joints", "loads"})]
     for several, others, own in (
         (mechanism.joints, known.joints, {"position", "rate"}),
         (mechanism.loads, known.loads, {"wrench", "axes"}),

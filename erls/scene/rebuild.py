@@ -1,4 +1,4 @@
-"""Mechanisms of scenes that start elsewhere, or bear other loads, than one that was built: the rest of it serves again."""
+"""Mechanisms of scenes that start elsewhere than one that was built, or bear other loads: the rest serves again."""
 
 from __future__ import annotations
 

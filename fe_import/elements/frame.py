@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.elements.sections import SectionConstants
-from fe_import.model import Array, BeamLines, IntArray, ThermalLoad
+from fe_import.model import Array, BeamLines, ThermalLoad
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the sixth-degree products of the shape functions
 _POINTS, _WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -54,12 +54,13 @@ class FrameElement:
 
 def stacked(elements: Sequence[FrameElement]) -> FrameElement:
     """All of them as one."""
-    sections = [vars(element.section) for element in elements]
+    sections: list[dict[str, Any]] = [vars(element.section) for element in elements]
+    section: dict[str, Any] = {name: np.array([each[name] for each in sections]) for name in sections[0]}
     numbers = ("length", "youngs_modulus", "shear_modulus", "density", "thermal_expansion")
     return FrameElement(
         nodes=np.array([element.nodes for element in elements], dtype=np.int64),
         axes=np.stack([element.axes for element in elements]),
-        section=SectionConstants(**{name: np.array([each[name] for each in sections]) for name in sections[0]}),
+        section=SectionConstants(**section),
         **{name: np.array([getattr(element, name) for element in elements]) for name in numbers},
     )
 

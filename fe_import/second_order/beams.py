@@ -34,8 +34,8 @@ class LineFields:
 
 
 def line_fields(beams: BeamLines, elements: int | IntArray, ends: Array) -> LineFields:
-    """Fields of an element, or of elements (...), from nodal components (..., 12, m) in the mesh frame: displacement and
-    rotation of the first node, then of the second.
+    """Fields of an element, or of elements (...), from nodal components (..., 12, m) in the mesh frame: displacement
+    and rotation of the first node, then of the second.
     """
     axes, length = beams.axes[elements], np.asarray(beams.lengths[elements])[..., None]
     *several, _, count = ends.shape

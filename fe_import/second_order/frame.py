@@ -165,7 +165,8 @@ def _line_terms(
     by ``phi``.
     """
     lengths, axes = beams.lengths[elements], beams.axes[elements]
-    places = model.nodes[beams.nodes[elements, 0], None] + (lengths[:, None] * POINTS)[..., None] * fields.tangent[:, None]
+    along = (lengths[:, None] * POINTS)[..., None] * fields.tangent[:, None]
+    places = model.nodes[beams.nodes[elements, 0], None] + along
     full = composed(inside[0], fields.displacement, phi, places - model.nodes[start])
     masses = (beams.mass[elements] * lengths)[:, None] * WEIGHTS
     momentum, spin = of_masses(masses.ravel(), places.reshape(-1, 3), full.reshape(-1, *full.shape[2:]))

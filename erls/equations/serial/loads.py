@@ -22,7 +22,6 @@ from erls.equations import compiled_system as contract
 from erls.equations.serial.nodes import (
     NODE,
     NODE_STATE,
-    Node,
     NodeState,
     centre_record,
     from_node_axes,

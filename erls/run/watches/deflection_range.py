@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.errors import link_errors
 from erls.run.deflection.estimate import DeflectionError

@@ -94,8 +94,8 @@ def evaluate(task: Task) -> list[Row]:
 
 
 def looks_at_bending(number: int) -> bool:
-    """Whether a point is looked at for how far off links are that bend (`erls.run.watches.deflection_range`), where runs
-    do not state their error: one of 16 of the first, one of 128 of the others.
+    """Whether a point is looked at for how far off links are that bend (`erls.run.watches.deflection_range`), where
+    runs do not state their error: one of 16 of the first, one of 128 of the others.
     """
     return number % (_OF_FEW if number < _FEW else _OF_MANY) == 0
 
