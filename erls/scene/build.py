@@ -136,7 +136,8 @@ def build_mechanism(
         remarks=tuple(told),
     )
     chain, circuits = with_circuits(scene, chain)
-    closing = build_loops(scene, chain) + build_bushings(scene, chain) + build_couplings(scene) + circuits
+    loops = build_loops(scene, chain)
+    closing = loops + build_bushings(scene, chain) + build_couplings(scene, chain, loops) + circuits
     chain = without(replace(chain, loops=closing, effects=effects), ALL - effects)
     return Built(chain)
 
