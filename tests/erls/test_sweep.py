@@ -105,6 +105,25 @@ def test_a_lost_worker_loses_no_finished_point(tmp_path: Path, monkeypatch: pyte
     assert len(again.rows) == 6
 
 
+def test_what_variants_share_changes_no_bit() -> None:
+    """Mechanism, packed equations and scales of the first one serve others that start elsewhere under other loads."""
+    loads = '{point="tip", force=[0, 0, -1]}', '{point="tip", force=[0, 1, 0], follower=true}', "{force_per_mass=[1, 0, 0]}"
+    common = (*SHORT, f"loads=[{', '.join(loads)}]")
+    grid = {
+        "loads.0.force": ([0.0, 0.0, -1.0], [0.0, 0.5, -2.0]),
+        "loads.2.force_per_mass": ([1.0, 0.0, 0.0], [0.0, 3.0, 0.0]),
+        ANGLE: (0.0, 10.0),
+    }
+    found = erls.sweep(SCENE, grid, GET, overrides=common, workers=1)
+    for row in found.rows:
+        changes = [f"{key}={json.dumps(value)}" for key, value in zip(grid, row.parameters, strict=True)]
+        run = erls.simulate(erls.load_scene(SCENE, [*common, *changes]), verdict=False)
+        assert row.numbers is not None
+        assert row.numbers[0] == run.position("tip", run.end)[0]
+        assert row.numbers[2] == run.joint_angle("shoulder", 0.005)  # type: ignore[union-attr]
+    assert len(np.unique(found.numbers[:, 0])) == 8
+
+
 def test_functions_of_ones_own_reduce_runs(tmp_path: Path) -> None:
     """By name in workers; their names are columns."""
     found = erls.sweep(SCENE, GRID, height, overrides=SHORT, workers=2, store=tmp_path / "h.sweep")
