@@ -107,7 +107,8 @@ def test_a_lost_worker_loses_no_finished_point(tmp_path: Path, monkeypatch: pyte
 
 def test_what_variants_share_changes_no_bit() -> None:
     """Mechanism, packed equations and scales of the first one serve others that start elsewhere under other loads."""
-    loads = '{point="tip", force=[0, 0, -1]}', '{point="tip", force=[0, 1, 0], follower=true}', "{force_per_mass=[1, 0, 0]}"
+    follower = '{point="tip", force=[0, 1, 0], follower=true}'
+    loads = '{point="tip", force=[0, 0, -1]}', follower, "{force_per_mass=[1, 0, 0]}"
     common = (*SHORT, f"loads=[{', '.join(loads)}]")
     grid = {
         "loads.0.force": ([0.0, 0.0, -1.0], [0.0, 0.5, -2.0]),
