@@ -131,7 +131,7 @@ def large() -> Iterator[Figure]:
     """The hemisphere and the annulus at large displacement, on the shipped and on finer meshes."""
     for name, meshes, points in (
         ("hemisphere", ((16, 16), (24, 24), (32, 32)), (("pulled", 0, 4.067), ("pushed", 1, 8.178))),
-        ("annulus", ((6, 48), (10, 80)), (("inner", 2, 13.891), ("outer", 2, 17.528))),
+        ("annulus", ((6, 48), (10, 80), (14, 112)), (("inner", 2, 13.891), ("outer", 2, 17.528))),
     ):
         for nx, ny in meshes:
             run = on_mesh(name, nx, ny)

@@ -21,6 +21,7 @@ from fe_import.elements.solid_mesh import ElementBlock, ShellCells, SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import as_spelt, choose
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
+from fe_import.mesh.first_order import of_first_order
 from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
@@ -87,6 +88,8 @@ def read_mesh(path: Path, ignore: Sequence[str] = (), wanted: Wanted = Wanted())
     if not path.exists():
         raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
     raw = _read(path)
+    if wanted.shells and not wanted.solids:  # beside solids they share all nodes with these
+        raw = of_first_order(raw)
     left_out = _left_out(raw, ignore, str(path), wanted)
     solids = _solid_blocks(raw, str(path)) if wanted.solids else []
     if not wanted.solids:
@@ -219,7 +222,7 @@ def _shell_cells(raw: RawMesh, wanted: Wanted, where: str) -> dict[int, IntArray
             "shells that cannot be assembled: " + _listing((name, counts[name]) for name in unsupported),
             where=where,
             limit=", ".join(_SHELLS_BY_MESHIO_NAME),
-            remedy="mesh with straight-sided elements of first order",
+            remedy="beside solids mesh with straight-sided elements of first order",
         )
     if not counts:
         raise FEImportError(

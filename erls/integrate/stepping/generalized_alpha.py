@@ -29,6 +29,7 @@ from erls.integrate.stepping.alpha_memory import (
     AUTO,
     BEFORE,
     DONE,
+    EAGER,
     ERROR,
     EVALUATIONS,
     EXTRAPOLATED,
@@ -62,25 +63,17 @@ from erls.integrate.stepping.alpha_memory import (
 from erls.maths import dense
 from erls.maths.jit import ENABLED, kernel, part
 
+_EAGER_STEPS = 8  # with a fresh matrix in every iteration, after one that converged with nothing less
+
 _ADVANCE: Any = None
 if ENABLED:
     from numba import types as _t
 
     _reals, _integers = contract.REALS, contract.INTEGERS
     _ADVANCE = _t.int64(
-        STEP_FUNCTIONS,
-        _reals,
-        _integers,
-        _reals,
-        _reals,
-        _integers,
-        _reals,
-        _reals,
-        _reals,
-        contract.MATRIX,
-        _t.float64[:, :, ::1],
-        contract.MATRIX,
-    )
+        STEP_FUNCTIONS, _reals, _integers, _reals, _reals, _integers, _reals, _reals, _reals,
+        contract.MATRIX, _t.float64[:, :, ::1], contract.MATRIX,
+    )  # fmt: skip
 
 ONE_DIGIT = 1 / 16  # of the rounding of `Settings`, which is that of sixteen
 
@@ -267,6 +260,8 @@ def advance(
     tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
     for less the older it gets; or when the residual is small against its terms. Where rounding is what the tolerance
     allows, one more iteration brings the error to the last digit: what is left has a sign, and adds up over many steps.
+    Where iterations that renew the matrix now and then (`AUTO`) do not converge, a step is tried with a fresh one in each
+    before it is given up.
     """
     use, progress = read_settings(own, places, places[0]), read_course(own, places, places[1])
     memory, rates, counts = read_memory(own, places, places[2]), progress.rates, progress.counts
@@ -277,7 +272,8 @@ def advance(
         t = min(times[row], use.last)
         for i in range(samples.shape[1]):
             scratch[i] = samples[row, i]
-        begin_fresh = counts[FACTORED] == 0 or use.matrix == UPDATE
+        always = use.matrix == UPDATE or (use.matrix == AUTO and counts[EAGER] > 0)
+        begin_fresh = counts[FACTORED] == 0 or always
         if use.matrix == AUTO and rates[SPENT] >= use.patience:
             begin_fresh = True
         converged = False
@@ -353,7 +349,7 @@ def advance(
                 within = size <= rounding or size * rate <= (use.tolerance + ONE_DIGIT * rounding) * (1 - rate)
                 if close and not (within or once_more or k + 1 == most):
                     once_more, steady = True, rate
-                    fresh = use.matrix == UPDATE
+                    fresh = always
                     earlier, before = before, size
                     rates[BEFORE] = before
                     continue
@@ -375,15 +371,18 @@ def advance(
                 if (k >= use.over and rate > 2) or (k > 1 and left > most - k and not renewable):
                     found = SLOW
                     break
-                fresh = use.matrix == UPDATE or (use.matrix == AUTO and k > 1 and left > use.renewal)
+                fresh = always or (use.matrix == AUTO and k > 1 and left > use.renewal)
                 earlier = before
                 before = size
                 rates[BEFORE] = before
             if not converged:
                 counts[REASON] = found
-                if begin_fresh or use.matrix == FROZEN:
+                if always or use.matrix == FROZEN or (begin_fresh and use.renewal == math.inf):
+                    counts[EAGER] = 0
                     return FAILED
-                begin_fresh = True
+                always, begin_fresh = begin_fresh, True
+                counts[EAGER] = _EAGER_STEPS + 1 if always else 0
+        counts[EAGER] = max(0, counts[EAGER] - 1)
         status = judge(use, progress, memory)
         if status == INACCURATE:
             return status
