@@ -2,8 +2,9 @@
 
     python benchmarks/shells.py [--NAME ...] [--page] [--json FILE]
 
-All tables (half an hour of one core, most of it the large displacements on fine meshes), or those that are named; `--page`
-puts them into docs/shells.md as they come out, each as soon as it is there, and so does `--json`, so that parts add up:
+All tables (half an hour of one core, most of it the large displacements on fine meshes), or those that are named.
+`--page` puts them into docs/shells.md as they come out, each as soon as it is there, `--json` their figures into a
+file, so that parts add up:
 
 - `--standard`, `--twisted`, `--thin`, `--large`, `--paths`, `--flight`: scenes of `data/shells/`, geometrically exact
   shells (`benchmarks/shell_figures.py`); `--patches`: constant strains on a distorted mesh, turns as rigid bodies;
@@ -73,7 +74,7 @@ def roll_up() -> dict[str, Any]:
             run = erls.simulate(scene, verdict=False)
         except SimulationError as problem:
             found[name] = str(problem)
-            print(f"{name:<44}  {problem}", flush=True)
+            print(f"{name:<44}  {str(problem).split('; got')[0]}", flush=True)
             continue
         assert isinstance(run, BodyRest)
         took, off = work(run.statics), float(np.abs(run.position("b", 1.0)).max())
@@ -84,12 +85,12 @@ def roll_up() -> dict[str, Any]:
 
 
 def right_angle() -> dict[str, Any]:
-    """What iteration matrices take over 30 s, for a given step: iterations, factorizations, and both as work, one of the
-    latter for the six iterations that `erls.integrate.lie_generalized_alpha` takes it for.
+    """What iteration matrices take over 30 s, for a given step: iterations, factorizations, both as work, one of the
+    latter for the six iterations that `erls.integrate.lie_generalized_alpha` takes it for, and time of the processor.
     """
     found: dict[str, Any] = {}
-    heads = f"{'iterations':>11}{'factored':>10}{'halved':>8}{'work':>8}{'of update':>11}{'time [s]':>10}{'of update':>11}"
-    print(f"{'right-angle cantilever':<28}{heads}")
+    heads = ("iterations", 11), ("factored", 10), ("halved", 8), ("work", 8), ("of update", 11), ("time [s]", 10)
+    print(f"{'right-angle cantilever':<28}" + "".join(f"{x:>{n}}" for x, n in (*heads, heads[4])))
     for group in ("SE(3)", "R3xSO(3)"):
         for step in (0.2, 0.1, 0.05, 0.025, 0.01, 0.0025):
             first: tuple[float, float] | None = None

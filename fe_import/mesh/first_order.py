@@ -1,7 +1,7 @@
 """Surfaces of second order as elements of first order on the same nodes.
 
-A triangle of six nodes becomes four triangles, a quadrangle of eight or nine four quadrangles, so that nodes, their sets
-and what hangs on them stay. The middle of eight nodes is where their shape functions have it.
+A triangle of six nodes becomes four triangles, a quadrangle of eight or nine four quadrangles, so that nodes, their
+sets and what hangs on them stay. The middle of eight nodes is where their shape functions have it.
 """
 
 from __future__ import annotations

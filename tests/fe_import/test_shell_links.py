@@ -265,7 +265,7 @@ def test_surfaces_of_second_order_are_cut(tmp_path: Path, kind: str) -> None:
     cut = reduce_link(write_toml(tmp_path / "cut.toml", data))
     np.testing.assert_allclose(cut.frequencies_hz[6:], fine.frequencies_hz[6:], rtol=1e-8)
     (tmp_path / "mesh.inp").write_text(deck.replace(lines[-1], lines[-1] + "99"))
-    with pytest.raises(FEImportError, match="node|nodes"):
+    with pytest.raises(FEImportError, match=r"node"):
         reduce_link(tmp_path / "cut.toml")
 
 

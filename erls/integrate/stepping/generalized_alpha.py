@@ -260,8 +260,8 @@ def advance(
     tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
     for less the older it gets; or when the residual is small against its terms. Where rounding is what the tolerance
     allows, one more iteration brings the error to the last digit: what is left has a sign, and adds up over many steps.
-    Where iterations that renew the matrix now and then (`AUTO`) do not converge, a step is tried with a fresh one in each
-    before it is given up.
+    Where iterations that renew the matrix now and then (`AUTO`) do not converge, a step is tried with a fresh one in
+    each before it is given up.
     """
     use, progress = read_settings(own, places, places[0]), read_course(own, places, places[1])
     memory, rates, counts = read_memory(own, places, places[2]), progress.rates, progress.counts
