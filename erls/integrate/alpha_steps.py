@@ -127,7 +127,7 @@ class Steps:
         places = [0, 0, 0]
         flat = FlatMemory(places)
         blank = alpha.Settings(*[0] * len(alpha.Settings._fields))
-        course = alpha.Course(np.zeros(6), np.zeros(8, dtype=np.int64))
+        course = alpha.Course(np.zeros(6), np.zeros(7, dtype=np.int64))
         course.rates[alpha.RATE], course.counts[alpha.USUAL] = SLOWEST_KNOWN, MAX_ITERATIONS
         places[:3] = [flat.put(record) for record in (blank, course, self._room())]
         self._own, self._places = flat.numbers, np.array(places, dtype=np.int64)
@@ -161,7 +161,7 @@ class Steps:
         """Change the step, with a₀ moved along; one that differs only by rounding keeps the iteration matrix."""
         memory = self._memory
         if abs(h - self.h) > 1e-6 * h:
-            self._progress.counts[[alpha.FACTORED, alpha.EAGER]] = 0
+            self._progress.counts[alpha.FACTORED] = 0
         if self.h:
             a = memory.a[: len(memory.v)]
             memory.alg[:] = a + (memory.alg - a) * (h / self.h)

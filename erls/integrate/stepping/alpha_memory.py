@@ -18,7 +18,7 @@ ZERO, LAST, EXTRAPOLATED = range(3)  # what accelerations and multipliers start 
 SINGULAR, SLOW, NOT_FINITE = 1, 2, 3  # reasons of a failure
 
 RATE, SPENT, BEFORE, SIZE, GOAL, ERROR = range(6)  # of `Course.rates`
-FACTORED, USUAL, REASON, STEPS, EVALUATIONS, ITERATIONS, FACTORIZATIONS, EAGER = range(8)  # of `Course.counts`
+FACTORED, USUAL, REASON, STEPS, EVALUATIONS, ITERATIONS, FACTORIZATIONS = range(7)  # of `Course.counts`
 
 
 class Settings(NamedTuple):
@@ -88,9 +88,9 @@ class Course(NamedTuple):
     rates : (6,) array
         Rate of convergence; iterations spent beyond the few that a fresh matrix needs; the last two corrections and
         their goal [m]; local error of the last step [m].
-    counts : (8,) array
+    counts : (7,) array
         Whether there is an iteration matrix; fewest iterations with it; reason of a failure; steps made; evaluations,
-        iterations, factorizations; steps ahead that take a fresh matrix in every iteration, although it is `AUTO`.
+        iterations, factorizations.
     """
 
     rates: Vector

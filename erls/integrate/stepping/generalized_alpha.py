@@ -29,7 +29,6 @@ from erls.integrate.stepping.alpha_memory import (
     AUTO,
     BEFORE,
     DONE,
-    EAGER,
     ERROR,
     EVALUATIONS,
     EXTRAPOLATED,
@@ -63,17 +62,25 @@ from erls.integrate.stepping.alpha_memory import (
 from erls.maths import dense
 from erls.maths.jit import ENABLED, kernel, part
 
-_EAGER_STEPS = 8  # with a fresh matrix in every iteration, after one that converged with nothing less
-
 _ADVANCE: Any = None
 if ENABLED:
     from numba import types as _t
 
     _reals, _integers = contract.REALS, contract.INTEGERS
     _ADVANCE = _t.int64(
-        STEP_FUNCTIONS, _reals, _integers, _reals, _reals, _integers, _reals, _reals, _reals,
-        contract.MATRIX, _t.float64[:, :, ::1], contract.MATRIX,
-    )  # fmt: skip
+        STEP_FUNCTIONS,
+        _reals,
+        _integers,
+        _reals,
+        _reals,
+        _integers,
+        _reals,
+        _reals,
+        _reals,
+        contract.MATRIX,
+        _t.float64[:, :, ::1],
+        contract.MATRIX,
+    )
 
 ONE_DIGIT = 1 / 16  # of the rounding of `Settings`, which is that of sixteen
 
@@ -260,8 +267,6 @@ def advance(
     tolerance, with the rate of earlier steps at first (E. Hairer & G. Wanner, Solving ODEs II, sec. IV.8), which counts
     for less the older it gets; or when the residual is small against its terms. Where rounding is what the tolerance
     allows, one more iteration brings the error to the last digit: what is left has a sign, and adds up over many steps.
-    Where iterations that renew the matrix now and then (`AUTO`) do not converge, a step is tried with a fresh one in
-    each before it is given up.
     """
     use, progress = read_settings(own, places, places[0]), read_course(own, places, places[1])
     memory, rates, counts = read_memory(own, places, places[2]), progress.rates, progress.counts
@@ -272,8 +277,7 @@ def advance(
         t = min(times[row], use.last)
         for i in range(samples.shape[1]):
             scratch[i] = samples[row, i]
-        always = use.matrix == UPDATE or (use.matrix == AUTO and counts[EAGER] > 0)
-        begin_fresh = counts[FACTORED] == 0 or always
+        begin_fresh = counts[FACTORED] == 0 or use.matrix == UPDATE
         if use.matrix == AUTO and rates[SPENT] >= use.patience:
             begin_fresh = True
         converged = False
@@ -349,7 +353,7 @@ def advance(
                 within = size <= rounding or size * rate <= (use.tolerance + ONE_DIGIT * rounding) * (1 - rate)
                 if close and not (within or once_more or k + 1 == most):
                     once_more, steady = True, rate
-                    fresh = always
+                    fresh = use.matrix == UPDATE
                     earlier, before = before, size
                     rates[BEFORE] = before
                     continue
@@ -371,18 +375,15 @@ def advance(
                 if (k >= use.over and rate > 2) or (k > 1 and left > most - k and not renewable):
                     found = SLOW
                     break
-                fresh = always or (use.matrix == AUTO and k > 1 and left > use.renewal)
+                fresh = use.matrix == UPDATE or (use.matrix == AUTO and k > 1 and left > use.renewal)
                 earlier = before
                 before = size
                 rates[BEFORE] = before
             if not converged:
                 counts[REASON] = found
-                if always or use.matrix == FROZEN or (begin_fresh and use.renewal == math.inf):
-                    counts[EAGER] = 0
+                if begin_fresh or use.matrix == FROZEN:
                     return FAILED
-                always, begin_fresh = begin_fresh, True
-                counts[EAGER] = _EAGER_STEPS + 1 if always else 0
-        counts[EAGER] = max(0, counts[EAGER] - 1)
+                begin_fresh = True
         status = judge(use, progress, memory)
         if status == INACCURATE:
             return status
