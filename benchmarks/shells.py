@@ -2,7 +2,7 @@
 
     python benchmarks/shells.py [--NAME ...] [--page] [--json FILE]
 
-All tables (half an hour of one core, most of it the large displacements on fine meshes), or those that are named.
+All tables (a quarter of an hour of one core, most of it the large displacements on fine meshes), or those that are named.
 `--page` puts them into docs/shells.md as they come out, each as soon as it is there, `--json` their figures into a
 file, so that parts add up:
 
