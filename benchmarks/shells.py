@@ -2,9 +2,9 @@
 
     python benchmarks/shells.py [--NAME ...] [--page] [--json FILE]
 
-All tables (a quarter of an hour of one core, most of it the large displacements on fine meshes), or those that are named.
-`--page` puts them into docs/shells.md as they come out, each as soon as it is there, `--json` their figures into a
-file, so that parts add up:
+All tables (a quarter of an hour of one core, most of it the large displacements on fine meshes), or those that are
+named. `--page` puts them into docs/shells.md as they come out, each as soon as it is there, `--json` their figures into
+a file, so that parts add up:
 
 - `--standard`, `--twisted`, `--thin`, `--large`, `--paths`, `--flight`: scenes of `data/shells/`, geometrically exact
   shells (`benchmarks/shell_figures.py`); `--patches`: constant strains on a distorted mesh, turns as rigid bodies;
