@@ -135,7 +135,8 @@ class Shell(Record, frozen=True):
     Attributes
     ----------
     mesh : str
-        As in ``[solid]``; every triangle and quadrangle of it is a shell. Left out beside ``[solid]``.
+        As in ``[solid]``; every triangle and quadrangle of it is a shell, of second order four. Left out beside
+        ``[solid]``.
     material : str
         A name from ``[materials]``, for the whole mesh.
     thickness : float, optional
