@@ -12,7 +12,6 @@ by steps that are as small as the derivatives need them (E. Hairer, S. P. Nørse
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -21,14 +20,13 @@ from erls.equations.system import metre_scales
 from erls.equations.tangents import Knots
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg
-from erls.maths.jit import any_scalar
 from erls.maths.so3 import Array
 from erls.sensitivity.equations import Equations
+from erls.sensitivity.forces import ComplexForces
 from fe_import.model import IntArray
 
 _SMALL, _SLOW = 1e-7, 1e-7
 """Steps of differences along a derivative, of the size of the mechanism, and [m/s]."""
-_STEP = 1e-30  # of complex steps
 _RTOL, _ATOL = 1e-11, 1e-12  # within a contact rates change by a thousand times what is left of their derivatives
 _MOST = 200_000  # evaluations of all accelerations
 
@@ -53,11 +51,10 @@ class Passage:
     def __init__(
         self, equations: Equations, bare: CompiledSystem, held: Callable[[], IntArray], reach: float
     ) -> None:
-        self._equations, self._bare, self._held, self._reach = equations, bare, held, reach
+        self._equations, self._held, self._reach = equations, held, reach
         self._system = equations.system
         self._metres = metre_scales(self._system)
-        self._residual: Any = any_scalar(bare.residual, getattr(bare, "called", None))
-        self._reals, self._scratch = bare.reals.astype(complex), bare.scratch.astype(complex)
+        self._forces = ComplexForces(bare)
         self._made = 0
 
     def over(self, times: Array, leg: Leg, y: Array, v: Array, changes: Array) -> Array:
@@ -124,11 +121,8 @@ class Passage:
         """(n, p) derivatives of the accelerations (n,) of a state, from (2, n, p) of the state."""
         self._made += changes.shape[2]
         right = self._equations.forces(Knots(np.array([t]), y[None], v[None], a[None]))[0]
-        out, still = np.empty(len(y), dtype=complex), a.astype(complex)
         for k in range(changes.shape[2]):
-            moved = (x + 1j * _STEP * changes[i, :, k] for i, x in enumerate((y, v)))
-            self._residual(self._reals, self._bare.integers, self._scratch, t, *moved, still, out)
-            right[:, k] += out.imag / _STEP
+            right[:, k] += self._forces.slope(t, y, v, a, changes[:, :, k])
         right[self._held()] = 0.0
         return np.asarray(-np.linalg.solve(self._system.mass_matrix(t, y), right))
 
