@@ -138,7 +138,9 @@ def force_derivative(
     else:
         terms = _along(line, base, STEP * difference.parameter.size)
     here = Term(0.0, 0.0, base)
-    found = [term.forces(sample, evaluation) for term in terms]
+    own, found = here.forces(sample, evaluation), [term.forces(sample, evaluation) for term in terms]
+    if all(np.array_equal(one, own) for one in found):  # a spring at a joint that follows a motion, say
+        return ForceDerivative((here, *terms))
     rounding = _ROUNDING * max(map(_largest, found)) / min(abs(term.apart) for term in terms if term.apart)
     inner, whole, curved = _inner(terms, found, rounding)
     if line is not None and whole and (inner is None or rounding > _LINEAR * whole):
@@ -147,7 +149,7 @@ def force_derivative(
         off = max(curved, rounding)
         share = (rounding * whole / off**2 / 4) ** 0.2  # the least of (off/whole)² s⁴ + (rounding/whole) / s
         return ForceDerivative(tuple(_along(line, base, share * STEP * difference.parameter.size)))
-    linear = _linear([here, *terms], [here.forces(sample, evaluation), *found], rounding)
+    linear = _linear([here, *terms], [own, *found], rounding)
     return ForceDerivative(linear or inner or tuple(terms))
 
 
