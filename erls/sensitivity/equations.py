@@ -30,7 +30,7 @@ from erls.sensitivity.schemes import Scheme
 from erls.sensitivity.variants import Difference
 from fe_import.model import IntArray
 
-_ROOM = 4_000_000
+_ROOM = 2_000_000
 """Numbers of tangents that are held at a time."""
 
 _SAMPLE = 64  # knots at which forces show how they depend on a parameter
