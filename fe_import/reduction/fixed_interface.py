@@ -134,11 +134,12 @@ def _inner(model: FEModel, matrix: sp.csc_array, inner: IntArray) -> sp.csc_arra
         return (own.T @ matrix @ own).tocsc()
     place = np.full(matrix.shape[0], -1, dtype=matrix.indices.dtype)
     place[rows] = np.arange(len(rows))
-    columns = matrix[:, rows]
-    to = place[columns.indices]
+    to = place[matrix.indices]
     kept = to >= 0
-    ends = np.concatenate([[0], np.cumsum(kept, dtype=matrix.indptr.dtype)])[columns.indptr]
-    return sp.csc_array((columns.data[kept], to[kept], ends), shape=(len(rows), len(rows)))
+    for column in np.flatnonzero(place < 0):  # few: what follows interfaces
+        kept[matrix.indptr[column] : matrix.indptr[column + 1]] = False
+    ends = np.concatenate([[0], np.cumsum(kept, dtype=matrix.indptr.dtype)])[matrix.indptr]
+    return sp.csc_array((matrix.data[kept], to[kept], np.append(ends[rows], ends[-1])), shape=(len(rows),) * 2)
 
 
 def constraint_modes(parts: Partition) -> Array:

@@ -214,11 +214,13 @@ class _Fronts:
             for first in range(begin, end, step):
                 # columns of the child are rows of a sparse matrix, whose entries go where its columns say
                 stop = min(first + step, end)
-                starts = np.zeros(target.shape[1] + 1, dtype=np.int32)
-                starts[to[first:stop] - shift + 1] = many
+                columns = to[first:stop] - shift
+                part = target.T[columns[0] : columns[-1] + 1]
+                starts = np.zeros(len(part) + 1, dtype=np.int32)
+                starts[columns - columns[0] + 1] = many
                 np.cumsum(starts, out=starts)
                 places = np.tile(rows[begin:] - shift, stop - first)
-                csr_todense(target.shape[1], height, starts, places, left.T[first:stop, begin:].reshape(-1), target.T)
+                csr_todense(len(part), height, starts, places, left.T[first:stop, begin:].reshape(-1), part)
 
     def eliminate_squared(self, front: int, across: Array) -> None:
         """Leave rest - across acrossᵀ to the parent."""
