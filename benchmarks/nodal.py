@@ -37,7 +37,7 @@ import test_shell_chains as shell_chains
 from link_files import write_toml
 from shell_meshes import shell_grid
 
-from erls.equations.nodal import elimination
+from erls.equations.nodal import assembly, elimination
 from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.blocks import blocks
 from erls.equations.nodal.equations import Nodal
@@ -175,16 +175,16 @@ def _cost(name: str, folder: Path, repeat: int) -> None:
     cost = 1e3 * spent / found.work.steps
     print(f"{name:<16}{system.size:11d}{cost:9.3f}{1e3 * cost / system.size:14.2f}", end="")
     print(f"{found.work.factorizations / 50:10.2f}{'band' if system.elimination.width >= 0 else 'fronts':>8}", end="")
-    chosen = elimination.DEARER
-    for dearer in (np.inf, 0.0):
-        elimination.DEARER = dearer
+    chosen = assembly.elimination
+    for way in (elimination.banded, elimination.fronted):
+        assembly.elimination = lambda *given, way=way: way(*given[:3])
         own = Nodal(mechanism).system
         derivatives, factors = _factored(own, rest, 0.3 * step**2, 2 * repeat)
         stored = 8e-6 * (own.elimination.entries + own.elimination.stack)
-        if dearer:
+        if own.elimination.width >= 0:
             print(f"{derivatives:16.1f}{own.elimination.width:6d}", end="")
         print(f"{stored:9.1f}{factors:9.1f}", end="")
-    elimination.DEARER = chosen
+    assembly.elimination = chosen
     begun = time.process_time()
     settings = {"SymmetricMode": True, "DiagPivotThresh": 0.01}
     sparse = sla.splu(whole.tocsc(), permc_spec="MMD_AT_PLUS_A", options=settings)

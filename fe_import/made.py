@@ -121,7 +121,7 @@ def link_from_matrices(
     """
     from fe_import.models.matrices import export_model
 
-    places = np.asarray(nodes, dtype=np.float64)
+    places = _numbers(nodes, "nodes").astype(np.float64)
     if places.ndim != 2 or places.shape[1] != 3:
         raise _fault("nodes are an (n, 3) array of places", places.shape, "nodes")
     tables: list[dict[str, Any]] = []
@@ -129,13 +129,16 @@ def link_from_matrices(
     numbers = dict[str, int]()
     for each, given in interfaces.items():
         table = dict(given) if isinstance(given, Mapping) else {"nodes": given}
-        own = np.unique(np.atleast_1d(np.asarray(table.pop("nodes", []))))
+        twice = next((field for field in ("node", "face") if field in table), "")
+        if twice:
+            raise _fault("an interface is given by its nodes", table[twice], f"interfaces.{each}.{twice}")
+        own = np.unique(np.atleast_1d(_numbers(table.pop("nodes", []), f"interfaces.{each}")))
         if own.dtype.kind not in "iu" or not own.size or not 0 <= own[0] <= own[-1] < len(places):
             raise _fault("an interface needs numbers of nodes", own.tolist(), f"interfaces.{each}")
         numbers, sets = (numbers | {each: int(own[0])}, sets) if own.size == 1 else (numbers, sets | {each: own})
         tables.append({**table, "name": each, "node" if own.size == 1 else "face": each})
     given = {"format": "arrays", "files": {}, "nodes": numbers}
-    description = described({**(options or {}), "name": name, "interfaces": tables, "matrices": given}, _ARRAYS)
+    description = described(joined(options, {"name": name, "interfaces": tables, "matrices": given}, _ARRAYS), _ARRAYS)
     export = _export(stiffness, mass, places, dof_map, sets)
     return reduced(export_model(export, description, _ARRAYS), description, _ARRAYS)
 
@@ -144,6 +147,7 @@ def _export(stiffness: Any, mass: Any, places: Any, dof_map: Any, sets: Mapping[
     """The arrays as an export, once their shapes are those of one link."""
     from fe_import.exports.base import Export
 
+    stiffness, mass = _numbers(stiffness, "stiffness"), _numbers(mass, "mass")
     size, count = np.shape(stiffness)[0] if np.ndim(stiffness) else 0, len(places)
     if np.shape(stiffness) != (size, size) or np.shape(mass) != (size, size):
         raise _fault("stiffness and mass are square, of one size", (np.shape(stiffness), np.shape(mass)), "stiffness")
@@ -153,7 +157,7 @@ def _export(stiffness: Any, mass: Any, places: Any, dof_map: Any, sets: Mapping[
             raise _fault("there are neither three nor six rows for each node", size, "dof_map")
         dof_map = np.full((count, 6), -1)
         dof_map[:, :each] = np.arange(size).reshape(count, each)
-    rows = np.asarray(dof_map)
+    rows = _numbers(dof_map, "dof_map")
     used = rows[rows >= 0] if rows.dtype.kind in "iu" else rows
     if rows.shape != (count, 6) or rows.dtype.kind not in "iu" or not np.array_equal(np.sort(used), np.arange(size)):
         raise _fault("dof_map is (n, 6), and has each row of the matrices once", rows.shape, "dof_map")
@@ -166,6 +170,21 @@ def _export(stiffness: Any, mass: Any, places: Any, dof_map: Any, sets: Mapping[
         node_sets={name: own.astype(np.int64) for name, own in sets.items()},
         notes={"program": "arrays"},
     )
+
+
+def joined(options: Mapping[str, Any] | None, given: Mapping[str, Any], where: str) -> dict[str, Any]:
+    """Tables that a caller adds to those that the arguments of a function make.
+
+    Raises
+    ------
+    FEImportError
+        BAD_FIELD: one stands in both.
+    """
+    for key in options or {}:
+        if key in given:
+            message, remedy = "the arguments say this", "take it out of options"
+            raise FEImportError(Cause.BAD_FIELD, message, where=f"{where}: options.{key}", remedy=remedy)
+    return {**(options or {}), **given}
 
 
 def described(data: dict[str, Any], where: str) -> LinkDescription:
@@ -202,6 +221,17 @@ def _plain(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     return str(value)
+
+
+def _numbers(value: Any, field: str) -> Any:
+    """An array or a sparse matrix of real numbers."""
+    try:
+        found = value if sp.issparse(value) else np.asarray(value)
+    except ValueError:  # rows of several lengths
+        raise _fault("no array of numbers", type(value).__name__, field) from None
+    if found.dtype.kind not in "iuf":
+        raise _fault("no array of real numbers", str(found.dtype), field)
+    return found
 
 
 def _fault(message: str, value: Any, field: str) -> FEImportError:

@@ -10,7 +10,7 @@ import numpy as np
 from fe_import.description.records import LinkDescription
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import choose
-from fe_import.made import described, reduced
+from fe_import.made import described, joined, reduced
 from fe_import.modal.model import ModalModel
 from fe_import.model import FEModel
 
@@ -78,22 +78,23 @@ def link_from_skfem(
     if material is None and stiffness is None:
         raise _fault("a material is needed", None)
     facets, tables = _faces(mesh, interfaces)
-    data: dict[str, Any] = {**(options or {}), "name": name, "interfaces": tables}
+    given: dict[str, Any] = {"name": name, "interfaces": tables}
     if material is not None:
-        data["materials"] = {"m": dict(material)}
+        given["materials"] = {"m": dict(material)}
+    data = joined(options, given, _WHERE)
     model: FEModel
     if is_basis:
         if stiffness is None:
             stiffness, mass = _assembled(source, described({**data, "solid": {"mesh": ""}}, _WHERE))
         data.pop("materials", None)
-        description = described({**data, "matrices": {"format": "scikit-fem", "files": {}}}, _WHERE)
+        description = described(joined(data, {"matrices": {"format": "scikit-fem", "files": {}}}, _WHERE), _WHERE)
         from fe_import.exports.skfem_basis import skfem_export
         from fe_import.models.matrices import export_model
 
         model = export_model(skfem_export(source, stiffness, mass, facets, _WHERE), description, _WHERE)
     else:
-        given = data.get("solid", {})
-        data["solid"] = {"mesh": "", "material": "m", **(given if isinstance(given, Mapping) else {})}
+        solid = data.get("solid", {})
+        data["solid"] = {"mesh": "", "material": "m", **(solid if isinstance(solid, Mapping) else {})}
         description = described(data, _WHERE)
         from fe_import.mesh.skfem_meshes import solid_mesh
         from fe_import.models.meshed import mesh_model

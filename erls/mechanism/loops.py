@@ -72,10 +72,14 @@ class LoopFreedom:
 
     @property
     def counts_turns(self) -> bool:
-        """Whether forces depend on how often it has turned, and how far it has advanced does not tell."""
-        return self.freedom.turns and not self.freedom.pitch and bool(
-            self.forces.stiffness or self.forces.stops or self.drive.kind == "pd"
-        )
+        """Whether forces along it depend on how often it has turned, and how far it has advanced does not tell."""
+        forced = self.forces.stiffness or self.forces.stops or self.drive.kind == "pd"
+        return self.may_lose_turns and bool(forced)
+
+    @property
+    def may_lose_turns(self) -> bool:
+        """Whether its frames do not tell how often it has turned."""
+        return self.freedom.turns and not self.freedom.pitch
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,10 @@ def best_of(
     numbers = range(len(found))
     least = min(numbers, key=lambda n: (tried[n].best.status not in (CONVERGED, INTERRUPTED), found[n][0].merit))
     best, own = found[least]
+    wall_s = sum(one.wall_s for one, _ in found)
     if confirm and not interrupted:  # known designs are not run again
         best = solved(best.problem, own, True)
+        wall_s += best.wall_s
     if interrupted:
         best = replace(best, outcomes=tuple(replace(o, status=INTERRUPTED) for o in best.outcomes))
-    return replace(best, tried=tuple(tried), chosen=tried[least].options, wall_s=sum(one.wall_s for one, _ in found))
+    return replace(best, tried=tuple(tried), chosen=tried[least].options, wall_s=wall_s)

@@ -32,9 +32,12 @@ def animate(run: Run, patterns: tuple[str, ...], times: ArrayLike | None, speed:
         raise SceneError(
             Cause.BAD_FIELD, "speed is positive", where="animate", value=speed, remedy="1 is as fast as it was"
         )
-    along = run.spread(_FRAMES) if times is None else np.atleast_1d(np.asarray(times, dtype=float))
-    places = np.stack([np.reshape(run.position(name, along), (len(along), 3)) for name in names])
     require_package("matplotlib", "Run.animate")
+    along = run.spread(_FRAMES) if times is None else np.atleast_1d(np.asarray(times, dtype=float))
+    if not along.size:
+        remedy = "give some, or leave them out for all of the run"
+        raise SceneError(Cause.BAD_FIELD, "no times", where="animate", value=[], remedy=remedy)
+    places = np.stack([np.reshape(run.position(name, along), (len(along), 3)) for name in names])
     import matplotlib.pyplot as plt
     from matplotlib.animation import FuncAnimation
 

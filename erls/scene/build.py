@@ -130,7 +130,8 @@ def build_mechanism(
     )
     effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
     chain, circuits = with_circuits(scene, chain)
-    closing = build_loops(scene, chain) + build_bushings(scene, chain) + build_couplings(scene) + circuits
+    loops = build_loops(scene, chain)
+    closing = loops + build_bushings(scene, chain) + build_couplings(scene, chain, loops) + circuits
     chain = without(replace(chain, loops=closing, effects=effects), ALL - effects)
     return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
 

@@ -17,10 +17,12 @@ from erls.mechanism.loop_turns import turning_signs
 from erls.mechanism.loops import Loop, LoopEnd, LoopFreedom
 from erls.mechanism.place import Place
 from erls.scene.build_joints import angle, joint_forces, reflected_inertia
+from erls.scene.bushings import Bushing
 from erls.scene.chain import Scene
 from erls.scene.joints import Loop as LoopRecord
 from fe_import.files.toml import choose
 
+UNCOUNTED = "turns of this joint cannot be counted: joints of the chain between its links turn about other axes"
 _RIGHT = 1e-9  # cosine
 
 
@@ -47,24 +49,15 @@ def build_loops(scene: Scene, mechanism: Mechanism) -> tuple[Loop, ...]:
 
 def _loop(record: LoopRecord, mechanism: Mechanism, frames: list[Array], at: Place) -> Loop:
     place = at.where
-    names = [link.name for link in mechanism.links]  # those between motions of a joint are not chosen from
-    number = names.index(record.link)
-    node = turning_node(mechanism, number, record.node, f"{place}.node")
+    number = [link.name for link in mechanism.links].index(record.link)
     if record.axis is None:  # parallel to the joint that carries the link
         axis = (frames[number] @ inverse(mechanism.joints[number].after))[:3, 2]
     else:
         axis = np.array(record.axis) / np.linalg.norm(record.axis)
     turn = _along(axis) if record.second_axis is None else two_axes(axis, record.second_axis, f"{place}.second_axis")
-    outer = LoopEnd(number, node, pose(frames[number][:3, :3].T @ turn))
-    if record.to_link:
-        other = names.index(record.to_link)
-        to_node = turning_node(mechanism, other, record.to_node, f"{place}.to_node")
-        inner = LoopEnd(other, to_node, pose(frames[other][:3, :3].T @ turn))
-    else:
-        position = frames[number][:3, :3] @ mechanism.links[number].model.nodes[node] + frames[number][:3, 3]
-        inner = LoopEnd(None, 0, pose(turn, position if record.position is None else np.array(record.position)))
+    inner, outer = ends_of(record, turn, mechanism, frames, place)
     start = frames[number] @ outer.frame
-    start[:3, 3] = frames[number][:3, :3] @ mechanism.links[number].model.nodes[node] + frames[number][:3, 3]
+    start[:3, 3] = place_of(mechanism, frames, outer)
     base = inner.frame
     if inner.link is not None:
         base = frames[inner.link] @ pose(position=mechanism.links[inner.link].model.nodes[inner.node]) @ inner.frame
@@ -90,13 +83,61 @@ def _freedom(
         zero -= 0.0 if freedom.turns else slide
     drive = build_drive(record.drive, place.folder, place.field("drive"), freedom.turns)
     found = LoopFreedom(freedom, zero, joint_forces(record, place), reflected_inertia(record, place), drive)
-    if found.counts_turns and not turning_signs(mechanism, loop)[1]:
+    if found.counts_turns and not countable(mechanism, loop):
         raise place.error(
             "drive" if drive.kind == "pd" else "stiffness",
-            "turns of this joint cannot be counted: joints of the chain between its links turn about other axes",
+            UNCOUNTED,
             remedy="put the spring or controller on a joint of the chain, or drive this one by a torque or a motion",
         )
     return found
+
+
+def countable(mechanism: Mechanism, loop: Loop) -> bool:
+    """Whether joints of the chain tell how often a closing joint has turned."""
+    return turning_signs(mechanism, loop)[1]
+
+
+def ends_of(
+    record: LoopRecord | Bushing, turn: Array, mechanism: Mechanism, frames: list[Array], where: str
+) -> tuple[LoopEnd, LoopEnd]:
+    """Inner and outer end of what connects a link with another one, or with the ground where its node is unless the
+    record has a position.
+
+    Parameters
+    ----------
+    record : Loop or Bushing
+        Of the scene.
+    turn : (3, 3) array
+        Axes of both ends in the world, at the initial joint coordinates.
+    mechanism : Mechanism
+    frames : list of (4, 4) array
+        Poses of its links there.
+    where : str
+
+    Raises
+    ------
+    SceneError
+        BAD_REFERENCE, BAD_FIELD.
+    """
+    names = [link.name for link in mechanism.links]  # those between motions of a joint are not chosen from
+
+    def end(link: str, node: str, field: str) -> LoopEnd:
+        number = names.index(link)
+        place = turning_node(mechanism, number, node, f"{where}.{field}")
+        return LoopEnd(number, place, pose(frames[number][:3, :3].T @ turn))
+
+    outer = end(record.link, record.node, "node")
+    if record.to_link:
+        return end(record.to_link, record.to_node, "to_node"), outer
+    position = place_of(mechanism, frames, outer) if record.position is None else np.array(record.position)
+    return LoopEnd(None, 0, pose(turn, position)), outer
+
+
+def place_of(mechanism: Mechanism, frames: list[Array], end: LoopEnd) -> Array:
+    """(3,) where the node of an end is in the world [m]."""
+    assert end.link is not None
+    frame = frames[end.link]
+    return np.asarray(frame[:3, :3] @ mechanism.links[end.link].model.nodes[end.node] + frame[:3, 3])
 
 
 def turning_node(mechanism: Mechanism, number: int, name: str, where: str) -> int:

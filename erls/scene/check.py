@@ -15,7 +15,16 @@ from erls.scene.check_sensors import check_sensors
 from erls.scene.check_servo import check_plan, check_servo
 from erls.scene.check_settings import check_settings
 from erls.scene.check_sticking import check_sticking
-from erls.scene.checks import bad, check_ends, check_joint_fields, check_names, check_tables, directed, not_negative
+from erls.scene.checks import (
+    bad,
+    check_ends,
+    check_joint_fields,
+    check_names,
+    check_tables,
+    directed,
+    not_negative,
+    refuse_settings,
+)
 from erls.scene.contacts import WORLD, Contact
 from erls.scene.joints import Acting, Coordinate, Joint, Loop
 from erls.scene.links import Link
@@ -26,6 +35,7 @@ DIRECTIONS = ("any", "rising", "falling")  # of events
 OF_JOINTS, OF_POINTS = ("angle", "rate"), ("x", "y", "z")
 FRAMES = ("dh", "joint")
 DEFORMATIONS = ("zero", "static")
+_TIED = ("joints", "loops", "bushings", "couplings")  # whose names are those of coordinates and reactions
 ASSEMBLIES = ("rigid", "elastic")
 AXES = ("world", "link")  # of loads
 # on one coordinate
@@ -63,6 +73,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     for kind in ("joints", "links", "points", "contacts", "loops", "bushings", "couplings", "events"):
         named = [(f"{file}: {kind}[{k}].name", item.name) for k, item in enumerate(getattr(scene, kind))]
         check_names(named)
+    tied = [(f"{file}: {kind}[{k}].name", item.name) for kind in _TIED for k, item in enumerate(getattr(scene, kind))]
+    check_names(tied)
+    taken = {name for _, name in tied}
     for k, joint in enumerate(scene.joints):
         choose(joint.type, CHAIN_TYPES, f"{file}: joints[{k}].type", SceneError)
         choose(joint.dh.convention, CONVENTIONS, f"{file}: joints[{k}].dh.convention", SceneError)
@@ -87,9 +100,9 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     for k, event in enumerate(scene.events):
         _check_event(event, scene, f"{file}: events[{k}]")
     check_bushings(scene, file)
-    check_circuits(scene, file)
+    check_circuits(scene, file, taken)
     check_couplings(scene, file)
-    _check_sensors(scene, file)
+    _check_sensors(scene, file, taken)
     check_servo(scene, file)
     check_plan(scene, file)
     if scene.simulation.bandwidth is not None:
@@ -97,9 +110,8 @@ def check_scene(scene: SceneRecord, file: str) -> None:
     _check_compound(scene, f"{file}: simulation")
     check_sticking(scene, file)
     if scene.loops or scene.bushings or scene.couplings or circuits(scene):
-        if scene.simulation.coordinates != "independent":
-            message, right = "loops tie independent coordinates", "remove it, or the loops"
-            raise bad(f"{file}: simulation.coordinates", message, scene.simulation.coordinates, right)
+        if scene.loops:
+            refuse_settings(scene.simulation, file, "[[loops]]", ("coordinates",))
         for k, joint in enumerate(scene.joints):
             _check_feed_forward(joint, f"{file}: joints[{k}]")
             for name, coordinate in joint.coordinates.items():
@@ -108,14 +120,12 @@ def check_scene(scene: SceneRecord, file: str) -> None:
             _check_feed_forward(loop, f"{file}: loops[{k}]")
 
 
-def _check_sensors(scene: SceneRecord, file: str) -> None:
+def _check_sensors(scene: SceneRecord, file: str, tied: set[str]) -> None:
     points = [point.name for point in scene.points]
     moving = [name for joint in scene.joints for name in joint_coordinates(joint)]
     moving += [loop.name for loop in scene.loops if JOINT_TYPES[loop.type].one is not None]
     moving += [charge_name(joint.name) for joint in scene.joints if has_circuit(joint)]
-    taken = {*points, *(joint.name for joint in scene.joints), *(loop.name for loop in scene.loops), "t", "energy"}
-    taken |= {coupling.name for coupling in scene.couplings}
-    check_sensors(scene.sensors, file, {"point": points, "joint": moving}, taken)
+    check_sensors(scene.sensors, file, {"point": points, "joint": moving}, {*points, *tied, "t", "energy"})
 
 
 def _check_assembly(scene: SceneRecord, place: str) -> None:
@@ -213,6 +223,9 @@ def _check_coordinates(joint: Joint, place: str) -> None:
         _check_component(joint, name, f"{place}.coordinates.{name}")
     if JOINT_TYPES[joint.type].one is not None:
         return
+    if has_circuit(joint):
+        message = f"a {joint.type} joint has no single coordinate that a motor could turn"
+        raise bad(f"{place}.motor", message, joint.type, "put joints of one coordinate each in its place")
     remedy = f"put it into coordinates.{known[0]}" if known else "remove it"
     for field in (*_ACTING, "initial"):
         given = getattr(joint, field, None)

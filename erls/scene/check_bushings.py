@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from erls.scene.chain import SceneRecord
-from erls.scene.checks import bad, check_ends
+from erls.scene.checks import check_ends, refuse_settings
 
 
 def check_bushings(scene: SceneRecord, file: str) -> None:
@@ -14,16 +14,8 @@ def check_bushings(scene: SceneRecord, file: str) -> None:
     SceneError
         BAD_FIELD, BAD_REFERENCE: naming file, field, value and remedy.
     """
-    links, s = [link.name for link in scene.links], scene.simulation
-    taken = {joint.name for joint in scene.joints} | {loop.name for loop in scene.loops}
+    links = [link.name for link in scene.links]
     for k, bushing in enumerate(scene.bushings):
-        place = f"{file}: bushings[{k}]"
-        if bushing.name in taken:
-            raise bad(f"{place}.name", "a joint or a loop has this name", bushing.name, "rename one")
-        check_ends(bushing, links, place, "a bushing holds")
-    for field, found, remedy in (
-        ("coordinates", s.coordinates != "independent", "use coordinates = 'independent'"),
-        ("formulation", s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
-    ):
-        if found and scene.bushings:
-            raise bad(f"{file}: simulation.{field}", "does not go with [[bushings]]", getattr(s, field), remedy)
+        check_ends(bushing, links, f"{file}: bushings[{k}]", "a bushing holds")
+    if scene.bushings:
+        refuse_settings(scene.simulation, file, "[[bushings]]", ("coordinates", "formulation"))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
+
 from erls.mechanism.drives import MotionDrive, PDDrive, VoltageDrive
 from erls.scene.chain import SceneRecord
 from erls.scene.checks import bad, positive
@@ -30,16 +32,14 @@ def has_circuit(joint: Joint) -> bool:
     return bool(_given(joint))
 
 
-def check_circuits(scene: SceneRecord, file: str) -> None:
-    """Refuse circuits that cannot be meant, and voltages without one.
+def check_circuits(scene: SceneRecord, file: str, taken: Collection[str]) -> None:
+    """Refuse circuits that cannot be meant, and voltages without one; ``taken`` are names of what ties or moves.
 
     Raises
     ------
     SceneError
         BAD_FIELD: naming file, field, value and remedy.
     """
-    taken = {joint.name for joint in scene.joints} | {loop.name for loop in scene.loops}
-    taken |= {coupling.name for coupling in scene.couplings}
     for k, joint in enumerate(scene.joints):
         place = f"{file}: joints[{k}]"
         given = _given(joint)

@@ -8,7 +8,7 @@ from erls.mechanism.joint_types import JOINT_TYPES, Freedom
 from erls.scene.build_joints import joint_coordinates
 from erls.scene.chain import SceneRecord
 from erls.scene.check_circuits import circuits
-from erls.scene.checks import bad, not_negative
+from erls.scene.checks import bad, not_negative, refuse_settings
 from erls.scene.couplings import Coupling
 from fe_import.files.toml import choose
 
@@ -30,13 +30,11 @@ def check_couplings(scene: SceneRecord, file: str) -> None:
     SceneError
         BAD_FIELD, BAD_REFERENCE: naming file, field, value and remedy.
     """
-    taken = {joint.name for joint in scene.joints} | {loop.name for loop in scene.loops}
     for k, coupling in enumerate(scene.couplings):
-        place = f"{file}: couplings[{k}]"
-        if coupling.name in taken:
-            raise bad(f"{place}.name", "a joint or a loop has this name", coupling.name, "rename one")
-        _check_coupling(coupling, scene, place)
-    _check_settings(scene, file)
+        _check_coupling(coupling, scene, f"{file}: couplings[{k}]")
+    for given, what in ((bool(scene.couplings), "[[couplings]]"), (circuits(scene), "circuits of motors")):
+        if given:
+            refuse_settings(scene.simulation, file, what, ("gauge", "coordinates", "formulation"))
 
 
 def _check_coupling(coupling: Coupling, scene: SceneRecord, place: str) -> None:
@@ -81,16 +79,3 @@ def _prescribed(scene: SceneRecord) -> set[str]:
     found |= {loop.name for loop in scene.loops if isinstance(loop.drive, MotionDrive)}
     parts = ((joint.name, name, own) for joint in scene.joints for name, own in joint.coordinates.items())
     return found | {f"{joint}/{name}" for joint, name, own in parts if isinstance(own.drive, MotionDrive)}
-
-
-def _check_settings(scene: SceneRecord, file: str) -> None:
-    """Couplings tie the coordinates of joints."""
-    s = scene.simulation
-    for field, found, remedy in (
-        ("gauge", s.formulation == "erls" and s.gauge != "joint-angle", "use gauge = 'joint-angle'"),
-        ("coordinates", s.coordinates != "independent", "use coordinates = 'independent'"),
-        ("formulation", s.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
-    ):
-        for given, what in ((bool(scene.couplings), "[[couplings]]"), (circuits(scene), "circuits of motors")):
-            if found and given:
-                raise bad(f"{file}: simulation.{field}", f"does not go with {what}", getattr(s, field), remedy)

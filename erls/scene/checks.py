@@ -88,6 +88,35 @@ def check_ends(end: Any, links: list[str], place: str, what: str) -> None:
         raise bad(f"{place}.position", message, end.position, "remove it")
 
 
+def refuse_settings(settings: Any, file: str, what: str, fields: Sequence[str]) -> None:
+    """Refuse those of some settings that do not go with what ties the joint coordinates of a tree.
+
+    Parameters
+    ----------
+    settings : Simulation
+    file : str
+    what : str
+        "[[couplings]]"
+    fields : sequence of str
+        Of ``gauge``, ``coordinates`` and ``formulation``.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD
+    """
+    dense = settings.formulation == "erls" and settings.gauge != "joint-angle"
+    found = {
+        "gauge": (dense, "use gauge = 'joint-angle'"),
+        "coordinates": (settings.coordinates != "independent", "use coordinates = 'independent'"),
+        "formulation": (settings.formulation == "nodal", "use formulation = 'erls' or 'ffr'"),
+    }
+    for field in fields:
+        refused, remedy = found[field]
+        if refused:
+            raise bad(f"{file}: simulation.{field}", f"does not go with {what}", getattr(settings, field), remedy)
+
+
 def check_joint_fields(joint: Record, kind: str, place: str) -> None:
     """A joint has those fields that only some kinds have, if its own does."""
     for field, meaning in OWN_FIELDS.items():

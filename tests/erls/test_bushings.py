@@ -22,7 +22,9 @@ def mounted(bushing: dict[str, Any], initial: dict[str, Any] | None = None, **mo
     """A body that floats, on a bushing."""
     body = {"mass": MASS, "centre_of_mass": CENTRE.tolist(), "inertia": np.diagonal(INERTIA).tolist()}
     joint = {"name": "free", "type": "floating", "dh": {"convention": "standard"}, "coordinates": initial or {}}
+    others = more.pop("couplings", [])
     return erls.make_scene(
+        couplings=others,
         gravity=more.pop("gravity", [0.0, 0.0, 0.0]),
         initial=more.pop("start", {}),
         simulation={"duration": 0.05, **more},
@@ -124,7 +126,8 @@ def test_between_two_links_forces_are_opposite() -> None:
         ({"stiffness": [-1.0, 0, 0, 0, 0, 0]}, "bushings[0].stiffness", "negative"),
         ({"stiffness": (SPRING + np.eye(6, k=1)).tolist()}, "bushings[0].stiffness", "not symmetric"),
         ({"damping": [1, 2, 3]}, "bushings[0].damping", "6"),
-        ({"name": "free"}, "bushings[0].name", "has this name"),
+        ({"name": "free"}, "bushings[0].name", "must differ"),
+        ({"stiffness": [1e9, 1e9, 1e9, -5e-4, 1.0, 1.0]}, "bushings[0].stiffness", "negative"),
     ],
 )
 def test_faults_name_their_field(bushing: dict[str, Any], field: str, words: str) -> None:
@@ -132,3 +135,17 @@ def test_faults_name_their_field(bushing: dict[str, Any], field: str, words: str
         erls.simulate(mounted(bushing))
     assert field in str(caught.value)
     assert words in str(caught.value)
+
+
+def test_couplings_have_other_names_than_bushings() -> None:
+    coupling = {"name": "mount", "joint": "free/slide_x", "follows": {"free/slide_y": 1.0}}
+    with pytest.raises(SceneError, match=r"couplings\[0\]\.name: names must differ"):
+        mounted({}, couplings=[coupling])
+
+
+@pytest.mark.parametrize(
+    "settings", [{"formulation": "nodal"}, {"formulation": "ffr", "coordinates": "absolute"}, {"bandwidth": 100.0}]
+)
+def test_settings_that_do_not_know_bushings_refuse_them(settings: dict[str, Any]) -> None:
+    with pytest.raises(SceneError, match=r"simulation\.(formulation|coordinates|bandwidth)"):
+        mounted({}, **settings)

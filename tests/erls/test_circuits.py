@@ -201,6 +201,16 @@ def test_faults_name_their_field(motor: dict[str, Any], drive: dict[str, Any], f
     assert words in str(caught.value)
 
 
+def test_joints_of_several_coordinates_have_no_circuit() -> None:
+    one = axis(STEP).record
+    with pytest.raises(SceneError, match=r"joints\[0\]\.motor: a spherical joint has no single coordinate"):
+        erls.make_scene(
+            simulation={"duration": 0.1},
+            joints=[{"name": "ball", "type": "spherical", "dh": {"convention": "standard"}, "motor": CIRCUIT}],
+            links=one.links,
+        )
+
+
 def test_formulations_without_circuits_refuse_them() -> None:
     with pytest.raises(SceneError, match="circuits of motors"):
         axis(STEP, formulation="nodal")

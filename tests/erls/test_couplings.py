@@ -219,6 +219,36 @@ def test_a_stepper_and_a_run_give_the_same() -> None:
     np.testing.assert_allclose(v[0], 0.1 * TORQUE / (MOTOR + RATIO**2 * WHEEL), rtol=1e-9)
 
 
+def hinged(joint: str, **more: Any) -> Any:
+    """A wheel that follows a closing joint, by which a body on a joint of several coordinates hangs from the ground."""
+    body = {"mass": 1.0, "inertia": [WHEEL, WHEEL, WHEEL], "points": {"seat": [0.0, 0.0, 0.0]}}
+    wheel, rotor = shaft("wheel", WHEEL, initial={"rate": RATIO * 15.0})
+    carrier = {"name": "carrier", "type": joint, "dh": DH}
+    turn = {"turn" if joint == "planar" else "turn_z": {"initial": {"rate": 15.0}}}
+    return erls.make_scene(
+        gravity=[0.0, 0.0, 0.0],
+        simulation={"duration": 1.0, **more},
+        joints=[{**carrier, "coordinates": turn}, wheel],
+        links=[{"name": "body", "rigid": body}, rotor],
+        loops=[{"name": "hinge", "type": "revolute", "link": "body", "node": "seat", "axis": [0.0, 0.0, 1.0]}],
+        couplings=[{"name": "gear", "joint": "wheel", "follows": {"hinge": RATIO}}],
+    )
+
+
+@pytest.mark.parametrize("formulation", ["erls", "ffr"])
+def test_closing_joints_are_followed_turn_after_turn(formulation: str) -> None:
+    """No force acts, so that rates stay."""
+    run = erls.simulate(hinged("planar", formulation=formulation), verdict=False)
+    wheel, turned = run.joint_angle("wheel", [0.0, 1.0]), run.joint_angle("carrier/turn", [0.0, 1.0])
+    np.testing.assert_allclose(wheel, RATIO * turned, rtol=0, atol=1e-9)
+    np.testing.assert_allclose(turned[1], 15.0, rtol=1e-8)
+
+
+def test_closing_joints_whose_turns_are_lost_are_not_followed() -> None:
+    with pytest.raises(SceneError, match=r"couplings\[0\]\.follows: turns of this joint cannot be counted"):
+        erls.simulate(hinged("spherical"))
+
+
 @pytest.mark.parametrize(
     ("coupling", "field", "words"),
     [
@@ -228,7 +258,7 @@ def test_a_stepper_and_a_run_give_the_same() -> None:
         ({"follows": {"motor": 0.0}}, "couplings[0].follows.motor", "not 0"),
         ({"damping": 1.0}, "couplings[0].damping", "ideal"),
         ({"stiffness": -1.0}, "couplings[0].stiffness", "0 or more"),
-        ({"name": "motor"}, "couplings[0].name", "has this name"),
+        ({"name": "motor"}, "couplings[0].name", "must differ"),
         ({"stops": {"stiffness": 1.0, "restitution": 0.5}}, "couplings[0].stops", "lower"),
     ],
 )
@@ -244,6 +274,7 @@ def test_faults_name_their_field(coupling: dict[str, Any], field: str, words: st
     [
         ({"gauge": "minimum-norm"}, "gauge"),
         ({"formulation": "ffr", "coordinates": "absolute"}, "coordinates"),
+        ({"formulation": "nodal"}, "formulation"),
         ({"bandwidth": 100.0}, "bandwidth"),
     ],
 )

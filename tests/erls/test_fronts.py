@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from test_shell_chains import arm, described, strip
 
-from erls.equations.nodal import elimination, matrix
+from erls.equations.nodal import assembly, elimination, matrix
 from erls.equations.nodal.equations import Nodal
 from erls.equations.nodal.joints import JointRows
 from erls.equations.nodal.nodes import numbers_of
@@ -71,10 +71,10 @@ def test_fronts_and_bands_solve_the_same_step(tmp_path: Path, monkeypatch: pytes
     described(tmp_path, strip(5, 4))
     mechanism = build_mechanism(load_chain(arm(tmp_path, "nodal"))).mechanism
     found = []
-    for dearer in (0.0, 1e9):
-        monkeypatch.setattr(elimination, "DEARER", dearer)
+    for way in (elimination.fronted, elimination.banded):
+        monkeypatch.setattr(assembly, "elimination", lambda *given, way=way: way(*given[:3]))
         system = Nodal(mechanism).system
-        assert (system.elimination.width < 0) == (dearer == 0.0)
+        assert (system.elimination.width < 0) == (not found)
         memory, rest = (system.flat.reals, system.flat.integers, system.flat.scratch), np.zeros(system.size)
         factors = np.zeros(system.flat.factors)
         system.residual(0.0, system.start, rest, rest)

@@ -168,6 +168,8 @@ def test_points_move(runs: dict[str, Run], tmp_path: Path) -> None:
     assert f"{TIMES[-1]:.4g} s" in axes.get_title()
     with pytest.raises(SceneError, match=r"elbo.*end1"):
         run.animate("elbo")
+    with pytest.raises(SceneError, match="no times"):
+        run.animate(times=[])
     with pytest.raises(SceneError, match="speed is positive"):
         run.animate(speed=0.0)
 

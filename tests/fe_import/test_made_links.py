@@ -77,6 +77,12 @@ FAULTS: dict[str, tuple[dict[str, Any], str]] = {
     "map of numbers": ({"dof_map": np.zeros((4, 6))}, "each row of the matrices once"),
     "no node": ({"interfaces": {"root": [0, 4]}}, "interfaces.root.*numbers of nodes"),
     "none": ({"interfaces": {"root": []}}, "interfaces.root.*numbers of nodes"),
+    "ragged": ({"nodes": [[0.0, 0.0, 0.0], [1.0]]}, "nodes: no array of numbers"),
+    "ragged interface": ({"interfaces": {"root": [[0], [1, 2]]}}, "interfaces.root: no array of numbers"),
+    "text": ({"stiffness": np.full((12, 12), "k")}, "stiffness: no array of real numbers"),
+    "complex": ({"mass": sp.eye_array(12) * 1j}, "mass: no array of real numbers"),
+    "twice": ({"interfaces": {"root": {"nodes": [0, 1, 2], "face": "x0"}}}, "interfaces.root.face"),
+    "options": ({"options": {"interfaces": []}}, "options.interfaces: the arguments say this"),
     "field": ({"interfaces": {"root": {"nodes": [0, 1, 2], "couplin": "rigid"}}}, "couplin"),
 }
 

@@ -17,8 +17,6 @@ from erls.equations.nodal.joints import JointRows
 from erls.equations.nodal.scatter import IntArray
 from erls.maths.front_plan import FrontPlan, front_plan, least_degree
 
-DEARER = 1.0
-"""Fronts count as this times what they take."""
 _PRODUCT, _ENTRY = 0.5, 8.0  # of fronts, measured beside a product of a band: rows are read once for four, but found
 _CHAIN = 12  # width of the band of a chain: two neighbouring nodes
 
@@ -39,6 +37,8 @@ class Elimination:
         Of the band; -1 where there are fronts.
     entries, stack : int
         Numbers of the factors, and what else they take.
+    work : float
+        Of a factorization, in products of a band.
     fronts, front_of, later, into : int arrays
         As of `erls.maths.front_plan.FrontPlan`; empty for a band.
     """
@@ -46,6 +46,7 @@ class Elimination:
     place: IntArray
     width: int
     entries: int
+    work: float
     stack: int = 0
     fronts: IntArray = field(default_factory=lambda: np.zeros((0, 7), dtype=np.int64))
     front_of: IntArray = field(default_factory=_none)
@@ -66,16 +67,24 @@ def elimination(count: int, pairs: IntArray, rows: JointRows, heavy: bool) -> El
     heavy : bool
         Whether every node has mass.
     """
+    band = banded(count, pairs, rows)
+    if not heavy or band.width < _CHAIN:
+        return band
+    fronts = fronted(count, pairs, rows)
+    return fronts if fronts.work < band.work else band
+
+
+def banded(count: int, pairs: IntArray, rows: JointRows) -> Elimination:
+    """As a band."""
     place, width = band_order(count, pairs, rows)
-    band = Elimination(place, width, len(place) * (3 * width + 1))
-    if not heavy or (width < _CHAIN and DEARER > 0):
-        return band
-    fronts, places = node_fronts(count, pairs, rows)
-    if DEARER * (_PRODUCT * fronts.products + _ENTRY * fronts.entries) >= 2 * len(place) * width**2:
-        return band
-    return Elimination(
-        places, -1, fronts.entries, fronts.stack, fronts.fronts, fronts.front_of, fronts.later, fronts.into
-    )
+    return Elimination(place, width, len(place) * (3 * width + 1), 2.0 * len(place) * width**2)
+
+
+def fronted(count: int, pairs: IntArray, rows: JointRows) -> Elimination:
+    """Front by front; every node has mass."""
+    own, places = node_fronts(count, pairs, rows)
+    work = _PRODUCT * own.products + _ENTRY * own.entries
+    return Elimination(places, -1, own.entries, work, own.stack, own.fronts, own.front_of, own.later, own.into)
 
 
 def node_fronts(count: int, pairs: IntArray, rows: JointRows) -> tuple[FrontPlan, IntArray]:

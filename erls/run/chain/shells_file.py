@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
+from erls.maths.own_units import in_own_units
 from fe_import.elements.link_shells import LinkShells
 from fe_import.files.hdf5.files import write_array, write_strings
 from fe_import.files.hdf5.values import Reader
@@ -71,12 +72,8 @@ def read_shells(file: Reader, nodes: int) -> LinkShells:
 
 
 def _indefinite(matrices: Array) -> NDArray[np.bool_]:
-    """Whether each of (k, n, n) is not symmetric, or resists something by less than nothing; in the units of its
-    diagonal, since forces and moments are far apart.
-    """
-    own = np.diagonal(matrices, axis1=1, axis2=2)
-    units = np.sqrt(np.where(own > 0, own, 1.0))
-    scaled = matrices / (units[:, :, None] * units[:, None, :])
+    """Whether each of (k, n, n) is not symmetric, or resists something by less than nothing."""
+    own, scaled = np.diagonal(matrices, axis1=1, axis2=2), in_own_units(matrices)
     turned = np.swapaxes(scaled, 1, 2)
     skewed = np.abs(scaled - turned).max(axis=(1, 2), initial=0.0) > _EXACT
     return np.asarray(skewed | (own < 0).any(axis=1) | (np.linalg.eigvalsh((scaled + turned) / 2)[:, 0] < -_EXACT))
