@@ -16,9 +16,7 @@ from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, BeamLines, FEModel, IntArray
 from fe_import.second_order.beams import INTEGRALS, POINTS, WEIGHTS, LineFields, line_fields
 from fe_import.second_order.composition import composed, composed_rotation, paired, twice_turned
-from fe_import.second_order.moments import of_inertia, of_masses, of_modes
-
-Pair = tuple[Array, Array]  # Ψ of a displacement and of a rotation vector, (3, n, n) each
+from fe_import.second_order.moments import Pair, of_body, of_inertia, of_masses, of_modes
 
 
 def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, reference: int, nodes: IntArray) -> SecondOrder:
@@ -38,8 +36,7 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
         Rising; whose fields are stored.
     """
     start = model.interface_nodes[reference].node
-    phi = shapes[model.dof_map[start, 3:]]
-    relative = _relative(model, shapes, start)
+    relative = relative_to(model, shapes, start)
     wanted = {int(node): k for k, node in enumerate(nodes)}
     count = shapes.shape[1]
     first, second = np.triu_indices(count - 6)
@@ -55,16 +52,10 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
             for k in range(2):
                 stored[k, wanted[node]] = fields[k][:, first, second]
         if node in extra:
-            place = model.nodes[node]
-            moved = relative[model.dof_map[node]]
-            full = composed(fields[0], moved[:3], phi, place - model.nodes[start])
-            turned = composed_rotation(fields[1], moved[3:], phi)
             mass, inertia = extra[node]
-            masses = of_masses(np.array([mass]), place[None], full[None])
-            turning = of_inertia(inertia, phi + moved[3:], turned)
-            momentum, spin = momentum + masses[0] + turning[0], spin + masses[1] + turning[1]
-            own = shapes[model.dof_map[node], 6:]
-            modal = modal + of_modes(own, np.concatenate([masses[0][:3], turning[0][3:]]))
+            place, rows = model.nodes[node], model.dof_map[node]
+            terms = of_body(mass, inertia, place, place - model.nodes[start], relative[rows], shapes[rows], fields)
+            momentum, spin, modal = momentum + terms[0], spin + terms[1], modal + terms[2]
 
     at = {start: (np.zeros((3, count - 6, count - 6)), np.zeros((3, count - 6, count - 6)))}
     settle(start, at[start])
@@ -81,7 +72,7 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
     return SecondOrder(reference, momentum, spin, modal, nodes, stored[0], stored[1])
 
 
-def _relative(model: FEModel, shapes: Array, start: int) -> Array:
+def relative_to(model: FEModel, shapes: Array, start: int) -> Array:
     """(d, m) the modes without the rigid-body motion of the node ``start``; zero in the rigid-body modes."""
     motions = model.rigid_body_modes()
     rows = model.dof_map[start]
