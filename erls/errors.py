@@ -33,6 +33,7 @@ class Cause(enum.StrEnum):
     NEWTON_FAILED = "Newton iteration did not converge"
     NOT_FINITE = "solution is no longer finite"
     STEP_TOO_SMALL = "step size became too small"
+    TOO_STIFF = "too stiff for an explicit method"
     NO_PICTURE = "picture could not be made"
     OUT_OF_MEMORY = "out of memory"
     RUNAWAY = "deflection beyond any meaning"

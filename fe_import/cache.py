@@ -32,10 +32,24 @@ def _sources_hash() -> str:
     return digest.hexdigest()
 
 
+_SMALL = 10_000  # nodes times modes up to which a reduction takes hardly longer than writing and reading its file
+_MOST_SMALL = 8
+_small: dict[str, ModalModel] = {}  # that this process has reduced lately and not written
+
+
 def reduce_cached(
-    link: LinkFile, folder: Path, tell: Callable[[str], None] | None = None
+    link: LinkFile, folder: Path, tell: Callable[[str], None] | None = None, passing: bool = False
 ) -> tuple[ModalModel, bool]:
     """Reduce, or read the earlier reduction of the same content from a cache folder.
+
+    Parameters
+    ----------
+    link : LinkFile
+    folder : Path
+    tell : callable, optional
+        Told about each step that takes time.
+    passing : bool
+        Whether the link is one of many variants: then this process alone remembers it if it is small.
 
     Returns
     -------
@@ -43,12 +57,20 @@ def reduce_cached(
     cached : bool
         Whether it came from the cache. An unreadable cache entry is made anew.
     """
-    path = folder / f"{cache_key(link)}.modal.h5"
+    key = cache_key(link)
+    if (known := _small.get(key)) is not None:
+        return known, True
+    path = folder / f"{key}.modal.h5"
     with contextlib.suppress(OSError, FEImportError):  # none there, or not readable: made anew
         return read_modal_file(path), True
     from fe_import.reduce import reduce_link  # elements and solvers: what was reduced before has no use for them
 
     model = reduce_link(link, tell)
+    if passing and len(model.nodes) * model.modes <= _SMALL:
+        _small[key] = model
+        while len(_small) > _MOST_SMALL:
+            _small.pop(next(iter(_small)), None)
+        return model, False
     with contextlib.suppress(OSError, FEImportError):  # a cache that cannot be written costs time, not the result
         folder.mkdir(parents=True, exist_ok=True)
         write_modal_file(path, model)

@@ -5,6 +5,8 @@ Chromium through Selenium, as Debian has them; skipped where they are not.
 
 from __future__ import annotations
 
+import contextlib
+import io
 import shutil
 from collections.abc import Callable, Iterator
 from io import BytesIO
@@ -17,6 +19,7 @@ from pages import ROOT
 from PIL import Image
 
 import erls
+from erls.cli.main import main
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 pytestmark = [
@@ -28,7 +31,13 @@ PAGES = {
     "two_link": ("data/robot/two_link.toml", ["simulation.duration=0.2"]),
     "solid": ("data/l_shape/solid.toml", ["simulation.duration=0.02"]),
     "roll_up": ("data/statics/roll_up.toml", []),
+    "parallel_robot": ("data/five_bar/parallel_robot.toml", ["simulation.duration=0.02"]),
 }
+COMMANDS = {
+    "optimum": ("optimize", "data/optimization/cantilever.toml", "--set", 'settings.methods=["esl-system"]'),
+    "inversion": ("invert", "data/inverse/passive_arm.toml", "--set", "simulation.step=0.02"),
+}
+VIEWLESS = ("inversion",)
 DESKTOP, PHONE = (1280, 900), (360, 780)
 
 
@@ -38,7 +47,10 @@ def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     folder = tmp_path_factory.mktemp("pages")
     for name, (scene, settings) in PAGES.items():
         erls.write_view(erls.simulate(erls.load_scene(ROOT / scene, settings)), folder / f"{name}.html")
-    return {name: (folder / f"{name}.html").as_uri() for name in PAGES}
+    for name, (command, file, *words) in COMMANDS.items():
+        with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
+            assert main([command, str(ROOT / file), *words, "-o", str(folder / f"{name}.html")]) == 0
+    return {name: (folder / f"{name}.html").as_uri() for name in (*PAGES, *COMMANDS)}
 
 
 @pytest.fixture(scope="module")
@@ -60,13 +72,17 @@ def browser() -> Iterator[Any]:
 
 def opened(browser: Any, page: str, size: tuple[int, int], scheme: str = "light") -> None:
     """A page, everything in it drawn."""
-    width, height = size
-    screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == PHONE}
-    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
+    _look_at(browser, size)
     media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
     browser.get(page)
     browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+
+
+def _look_at(browser: Any, size: tuple[int, int]) -> None:
+    width, height = size
+    screen = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": size == PHONE}
+    browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", screen)
 
 
 def said(browser: Any) -> list[str]:
@@ -75,7 +91,7 @@ def said(browser: Any) -> list[str]:
     return [text for text in messages if "GL Driver Message" not in text and "willReadFrequently" not in text]
 
 
-@pytest.mark.parametrize("name", ["steel_tall", "solid", "roll_up"])
+@pytest.mark.parametrize("name", ["steel_tall", "solid", "roll_up", "parallel_robot", "optimum", "inversion"])
 def test_pages_draw_everything_without_a_complaint(name: str, browser: Any, pages: dict[str, str]) -> None:
     """Every plot has its curves, the view shows something bent; dark pages are dark."""
     for scheme in ("light", "dark") if name == "steel_tall" else ("light",):
@@ -84,15 +100,20 @@ def test_pages_draw_everything_without_a_complaint(name: str, browser: Any, page
             if _until(browser, _all_drawn):
                 break
         assert _all_drawn(browser), (_curves(browser), browser.get_log("browser"))
-        browser.execute_script(
-            "document.querySelector('.view').scrollIntoView({block: 'center'});"
-            "const slider = document.querySelector('.controls input');"
-            "slider.value = slider.max; slider.dispatchEvent(new Event('input'))"
-        )
-        assert _until(browser, lambda browser: _colours(browser) >= 2), browser.get_log("browser")
+        if name not in VIEWLESS:
+            browser.execute_script(
+                "document.querySelector('.view').scrollIntoView({block: 'center'});"
+                "const slider = document.querySelector('.controls input');"
+                "slider.value = slider.max; slider.dispatchEvent(new Event('input'))"
+            )
+            assert _until(browser, lambda browser: _colours(browser) >= 2), browser.get_log("browser")
         shade = browser.execute_script("return getComputedStyle(document.body).backgroundColor")
         assert (sum(int(x) for x in shade[4:-1].split(",")) < 200) == (scheme == "dark")
         assert said(browser) == []
+    _assert_inside(browser, DESKTOP)
+    _look_at(browser, PHONE)
+    assert _until(browser, lambda browser: browser.execute_script("return document.documentElement.scrollWidth") <= 360)
+    _assert_inside(browser, PHONE)
 
 
 def _until(browser: Any, held: Callable[[Any], bool]) -> bool:
@@ -135,14 +156,22 @@ def _colours(browser: Any) -> int:
 
 @pytest.mark.parametrize("size", [DESKTOP, PHONE])
 def test_nothing_sticks_out(size: tuple[int, int], browser: Any, pages: dict[str, str]) -> None:
-    """No sideways scroll, also on a phone; tables that are wider scroll by themselves."""
+    """Of a page that is opened at this size."""
     opened(browser, pages["two_link"], size)
+    _assert_inside(browser, size)
+
+
+def _assert_inside(browser: Any, size: tuple[int, int]) -> None:
+    """No sideways scroll, also on a phone; tables that are wider scroll by themselves, on a desk none is."""
     assert browser.execute_script("return document.documentElement.scrollWidth") <= size[0]
     widest = browser.execute_script(
         "const boxes = [...document.querySelectorAll('.plot, .view, p, .wide')];"
         "return Math.max(...boxes.map(box => box.getBoundingClientRect().right))"
     )
     assert widest <= size[0]
+    if size == DESKTOP:
+        boxes = "return [...document.querySelectorAll('.wide')].map(box => box.scrollWidth - box.clientWidth)"
+        assert max(browser.execute_script(boxes), default=0) <= 0
 
 
 def test_pointing_tells_values_and_moves_one_cursor(browser: Any, pages: dict[str, str]) -> None:

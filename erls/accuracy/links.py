@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.errors import link_errors
 
@@ -36,5 +34,5 @@ def links_error(run: ChainRun) -> tuple[float | None, str]:
     if known is None:
         return None, why
     mechanism = run.formulation.mechanism
-    reach = sum(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
+    reach = sum(link.size for link in mechanism.links)
     return min(MARGIN * known, 2 * reach), why

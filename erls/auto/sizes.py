@@ -122,7 +122,7 @@ def _or_fails(value: Callable[[], T], otherwise: T) -> T:
 
 def _reach(mechanism: Mechanism) -> float:
     """Size of all links together [m]: points that are farther apart than twice that left them."""
-    return sum(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
+    return sum(link.size for link in mechanism.links)
 
 
 def _force(whole: ChainRun, less: Formulation) -> float:

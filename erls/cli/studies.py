@@ -33,6 +33,7 @@ def modes(
     *,
     output: Output = None,
     counts: str = "",
+    frequencies: str = "",
     link: str = "",
     tolerance: float = 1e-4,
     load_tolerance: float = 0.02,
@@ -47,7 +48,8 @@ def modes(
 ) -> int:
     """How many elastic modes are enough: raise their number until points, angles, loads and spectra stop changing.
 
-    Ends with exit code 4 when there are no three successive changes below the tolerances.
+    Ends with exit code 4 when there are no three successive changes below the tolerances, unless all modes that there
+    are have been taken.
 
     Parameters
     ----------
@@ -56,7 +58,10 @@ def modes(
     output
         Report to write: .html a self-contained page with plots, .json the JSON object.
     counts
-        Numbers of elastic modes, separated by commas; from 0 to all there are, in growing steps, unless given.
+        Numbers of elastic modes, separated by commas; from 0 to all there are, in growing steps, unless given. Modes of
+        equal frequency are taken together.
+    frequencies
+        Instead: limits up to which the modes of each link are taken [Hz], separated by commas.
     link
         Vary the modes of this link only; of all links alike unless given.
     tolerance
@@ -90,6 +95,7 @@ def modes(
         result = study_modes(
             scene,
             _counts(counts),
+            frequencies=_limits(frequencies),
             link=link,
             overrides=set_ or (),
             tolerances=Tolerances(tolerance, load_tolerance, frequency_tolerance),
@@ -108,7 +114,9 @@ def modes(
         print(mode_study_text(result, printed))
         tell_written(output)
     failed = [point.error.exit_code for point in result.points if point.error is not None]
-    return exit_code(result.complete, failed) or (0 if result.converged is not None else 4)
+    return exit_code(result.complete, failed) or (
+        0 if result.converged is not None or result.exhausted else 4
+    )
 
 
 @study.command
@@ -232,6 +240,13 @@ def _kept(changes: list[str] | None) -> list[str]:
 
 def _names(text: str) -> tuple[str, ...]:
     return tuple(name.strip() for name in text.split(",") if name.strip())
+
+
+def _limits(text: str) -> list[float] | None:
+    try:
+        return [float(part) for part in text.split(",") if part.strip()] or None
+    except ValueError:
+        raise bad("not numbers", "--frequencies", text, "separate them by commas, e.g. 100,500") from None
 
 
 def _counts(text: str, option: str = "--counts") -> list[int] | None:

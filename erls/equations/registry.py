@@ -45,6 +45,13 @@ def _nodal(mechanism: Mechanism, settings: Simulation) -> Formulation:
     return Nodal(mechanism, settings.elements_per_member, start, rules=rules)
 
 
+def share(formulation: Formulation, known: Formulation) -> None:
+    """Have a formulation take over what another one has made, as far as they are alike and of a kind that can."""
+    take = getattr(formulation, "share", None)
+    if take is not None and type(formulation) is type(known):
+        take(known)
+
+
 def closed_start_of(mechanism: Mechanism) -> ClosedStart:
     """Of the same mechanism with rigid links."""
     from erls.equations.erls.formulation import Erls

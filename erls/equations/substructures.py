@@ -132,4 +132,4 @@ def _nearest(link: Link) -> Array:
 
 def _reach(link: Link) -> float:
     """Size that makes rotations into lengths [m]."""
-    return float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) or 1.0
+    return link.size or 1.0

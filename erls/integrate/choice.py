@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import replace
@@ -145,7 +146,8 @@ def _compile_named(system: Any, settings: Simulation) -> None:
         for module in own[:2]:  # the first: what steps ask of systems without ties
             import_module(module)
     for module in own:
-        import_module(module)
+        if module not in sys.modules:
+            import_module(module)
     _ = system.compiled  # with what its size asks for, factors link by link
 
 

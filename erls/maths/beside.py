@@ -104,7 +104,7 @@ def compiling_beside(*modules: str) -> Iterator[None]:
     What that process has not begun when the block ends is compiled here, from the last one on. Blocks within blocks
     share the process, whose first task are the modules of the innermost one.
     """
-    waiting = [module for module in modules if not compiled_before(module)]
+    waiting = [module for module in modules if module not in sys.modules and not compiled_before(module)]
     if not waiting or (os.cpu_count() or 1) < 2:
         yield
         return

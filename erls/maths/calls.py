@@ -14,6 +14,7 @@ from typing import Any
 from erls.maths.jit import ENABLED, stood_for
 
 _known: list[Callable[..., Any]] = []
+_found: dict[tuple[int, int], tuple[Any, Any, int]] = {}  # beside each address what it is of, which so stays
 
 
 def address_of(function: Any, signature: Any) -> int:
@@ -22,8 +23,12 @@ def address_of(function: Any, signature: Any) -> int:
         if function not in _known:
             _known.append(function)
         return _known.index(function)
-    found = function.get_compile_result(signature)
-    return int(found.library.get_pointer_to_function(found.fndesc.llvm_func_name))
+    at = id(function), id(signature)
+    if at not in _found:
+        made = function.get_compile_result(signature)
+        pointer = int(made.library.get_pointer_to_function(made.fndesc.llvm_func_name))
+        _found[at] = function, signature, pointer
+    return _found[at][2]
 
 
 def handed(function: Any, signature: Any) -> Any:

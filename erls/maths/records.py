@@ -160,6 +160,55 @@ def overwrite(record: NamedTuple, numbers: Array, integers: IntArray, at: int) -
             numbers[integers[place]] = value
 
 
+class Laid(NamedTuple):
+    """A record as `Memory` lays it, for those that many memories hold: its numbers are gathered once.
+
+    Attributes
+    ----------
+    record : NamedTuple
+        Nothing in it changes any more.
+    table : tuple of int
+        As if its numbers began at 0.
+    starts : tuple of int
+        Places in the table of what says where in the numbers something lies.
+    whole : tuple of (int, array)
+        Places in the table of what lies in the integers themselves, and that.
+    numbers : (k,) array
+    """
+
+    record: Any
+    table: tuple[int, ...]
+    starts: tuple[int, ...]
+    whole: tuple[tuple[int, IntArray], ...]
+    numbers: Array
+
+
+def laid(record: NamedTuple) -> Laid:
+    """A record that is put into memory more than once."""
+    table: list[int] = []
+    starts: list[int] = []
+    whole: list[tuple[int, IntArray]] = []
+    parts: list[Array] = []
+    size = 0
+    for value, (name, axes, is_whole) in zip(record, _fields(type(record)), strict=True):
+        if axes is None:
+            table.append(int(value))
+            continue
+        array = np.asarray(value)
+        if array.ndim != axes:
+            raise ValueError(f"{type(record).__name__}.{name} has {array.ndim} axes instead of {axes}")
+        if is_whole:
+            whole.append((len(table), array))
+            table += [0, *array.shape]
+            continue
+        starts.append(len(table))
+        table += [size, *array.shape]
+        parts.append(np.ascontiguousarray(array, dtype=float).ravel())
+        size += array.size
+    numbers = parts[0] if len(parts) == 1 else np.concatenate([np.zeros(0), *parts])
+    return Laid(record, tuple(table), tuple(starts), tuple(whole), numbers)
+
+
 class Memory:
     """Flat numbers that grow by records, whose tables go to integers shared with other memories.
 
@@ -177,44 +226,32 @@ class Memory:
         self._size = sum(map(len, self._parts))
 
     def put(self, record: NamedTuple) -> int:
-        """Store a record; the place of its table."""
+        """Store a record, laid already or not; the place of its table."""
         return self.put_all([record])
 
     def put_all(self, records: Sequence[NamedTuple]) -> int:
-        """Store records of one type; the place of the first table, -1 without any.
+        """Store records of one type, laid already or not; the place of the first table, -1 without any.
 
         Tables follow each other, as long as that of one record each, and what lies in the integers themselves follows
         the last of them: functions find the k-th table by that length.
         """
-        if len({type(record) for record in records}) > 1:
+        known = [record if isinstance(record, Laid) else laid(record) for record in records]
+        if len({type(each.record) for each in known}) > 1:
             raise ValueError("records that follow each other are of one type")
-        at = len(self.integers)
-        tables: list[int] = []
-        whole: list[tuple[int, IntArray]] = []  # places in the tables of what lies in the integers themselves
-        for record in records:
-            self._add(record, tables, whole)
-        self.integers += tables
+        at, integers = len(self.integers), self.integers
+        whole: list[tuple[int, IntArray]] = []
+        for each in known:
+            first = len(integers)
+            integers += each.table
+            for place in each.starts:
+                integers[first + place] += self._size
+            whole += [(first + place, array) for place, array in each.whole]
+            self._parts.append(each.numbers)
+            self._size += len(each.numbers)
         for place, array in whole:
-            self.integers[at + place] = len(self.integers)
-            self.integers += [int(i) for i in array.ravel()]
+            integers[place] = len(integers)
+            integers += [int(i) for i in array.ravel()]
         return at if records else -1
-
-    def _add(self, record: NamedTuple, tables: list[int], whole: list[tuple[int, IntArray]]) -> None:
-        for value, (name, axes, is_whole) in zip(record, _fields(type(record)), strict=True):
-            if axes is None:
-                tables.append(int(value))
-                continue
-            array = np.asarray(value)
-            if array.ndim != axes:
-                raise ValueError(f"{type(record).__name__}.{name} has {array.ndim} axes instead of {axes}")
-            if is_whole:
-                whole.append((len(tables), array))
-                tables += [0, *array.shape]
-                continue
-            flat = np.ascontiguousarray(array, dtype=float).ravel()
-            tables += [self._size, *array.shape]
-            self._parts.append(flat)
-            self._size += len(flat)
 
     @property
     def numbers(self) -> Array:

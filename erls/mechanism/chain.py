@@ -59,6 +59,8 @@ class Mechanism:
         Names from `erls.mechanism.effects` that the equations of motion take into account.
     bandwidth : float or None
         Frequency above which modes follow statically [Hz]; None: all of them vibrate.
+    remarks : tuple of str
+        What the user should know about how it came about.
     """
 
     name: str
@@ -74,6 +76,7 @@ class Mechanism:
     contacts: tuple[PointContact, ...] = ()
     effects: frozenset[str] = ALL
     bandwidth: float | None = None
+    remarks: tuple[str, ...] = ()
 
     @property
     def parents(self) -> tuple[int, ...]:
@@ -156,7 +159,7 @@ class Mechanism:
     @property
     def reach(self) -> float:
         """Size of the largest link [m]."""
-        return max(1e-3, *(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in self.links))
+        return max(1e-3, *(link.size for link in self.links))
 
     @property
     def outermost(self) -> list[int]:

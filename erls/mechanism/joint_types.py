@@ -10,6 +10,7 @@ coordinates and nodes of elements hold the conditions. A new joint is one line o
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -50,7 +51,7 @@ class Freedom:
         """Row of the relative displacement (u, φ) in the joint frame that measures it."""
         return self.axis + 3 * self.turns
 
-    @property
+    @cached_property
     def direction(self) -> Array:
         """(3,) unit vector of the axis."""
         return np.asarray(np.eye(3)[self.axis])
@@ -60,7 +61,7 @@ class Freedom:
         """(3,) how far the origin moves per unit of the coordinate."""
         return self.direction * (self.pitch if self.turns else 1.0)
 
-    @property
+    @cached_property
     def screw(self) -> Array:
         """(6,) twist [v; ω] of unit rate, in the joint frame."""
         return np.concatenate([self.advance, self.direction * self.turns])
@@ -70,6 +71,7 @@ class Freedom:
         """Of the coordinate, and of a force along it."""
         return ("rad", "N m") if self.turns else ("m", "N")
 
+    @cached_property
     def parts(self) -> Array:
         """(4, 4, 4) its pose is a constant part, plus others times cosine and sine of the coordinate, and times it.
 
@@ -85,7 +87,7 @@ class Freedom:
     def poses(self, coordinates: Array) -> Array:
         """(..., 4, 4) poses at (...) coordinates."""
         factors = np.stack([np.ones_like(coordinates), np.cos(coordinates), np.sin(coordinates), coordinates])
-        return np.asarray(np.einsum("p...,pij->...ij", factors, self.parts()))
+        return np.asarray(np.einsum("p...,pij->...ij", factors, self.parts))
 
     def pose(self, coordinate: float) -> Array:
         """(4, 4) pose at a coordinate."""

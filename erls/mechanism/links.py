@@ -83,6 +83,11 @@ class Link:
         return len(self.stiffness)
 
     @cached_property
+    def size(self) -> float:
+        """From corner to corner of the box around its nodes [m]."""
+        return float(np.linalg.norm(np.ptp(self.model.nodes, axis=0)))
+
+    @cached_property
     def second_order(self) -> LinkSecondOrder | None:
         """Second-order kinematics relative to the inboard interface; None where the modal model holds none."""
         return link_second_order(self)

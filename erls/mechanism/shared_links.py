@@ -1,8 +1,10 @@
-"""Links that variants of a mechanism have in common: what was found of one serves the others."""
+"""What variants of a mechanism have in common: what was found of one serves the others."""
 
 from __future__ import annotations
 
+from collections.abc import Set
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
@@ -16,6 +18,27 @@ def sharing_links(mechanism: Mechanism, known: Mechanism) -> Mechanism:
         return mechanism
     pairs = zip(mechanism.links, known.links, strict=True)
     return replace(mechanism, links=tuple(old if same_link(new, old) else new for new, old in pairs))
+
+
+def differ_in_numbers(mechanism: Mechanism, known: Mechanism) -> bool:
+    """Whether all that two mechanisms differ in is where joints start, and how large loads are: the rest is the same
+    objects.
+    """
+    pairs: list[tuple[object, object, Set[str]]] = [(mechanism, known, {"joints", "loads"})]
+    for several, others, own in (
+        (mechanism.joints, known.joints, {"position", "rate"}),
+        (mechanism.loads, known.loads, {"wrench", "axes"}),
+    ):
+        if len(several) != len(others):
+            return False
+        pairs += [(one, other, own) for one, other in zip(several, others, strict=True)]
+    return all(one is other or _same_but(one, other, own) for one, other, own in pairs) and all(
+        one.axes == other.axes for one, other in zip(mechanism.loads, known.loads, strict=True)
+    )
+
+
+def _same_but(one: Any, other: Any, own: Set[str]) -> bool:
+    return all(value is vars(other)[name] for name, value in vars(one).items() if name not in own)
 
 
 def same_link(new: Link, old: Link) -> bool:

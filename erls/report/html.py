@@ -26,6 +26,7 @@ from erls.maths.so3 import Array
 _DIGITS = 7  # of numbers in plots
 _MOST_NUMBERS = 120_000  # of a view, times two
 _BOX = "@box@"  # for the name of what a part draws, which the page gives
+_NUMBER = re.compile(r"[-+]?[\d.]")  # what a cell with one begins with
 _SHORT = 3  # sections from which on a page has a list of contents
 
 
@@ -43,7 +44,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class Plot:
-    """A plot: curves over a common axis; ``logarithmic`` names the axes with a logarithmic scale (``x``, ``y``)."""
+    """A plot: curves over a common axis; ``logarithmic`` names the axes with a logarithmic scale (``x``, ``y``), and
+    values below ``least`` are not looked at more closely: a plot of nothing but rounding shows a straight line.
+    """
 
     title: str
     x_label: str
@@ -52,6 +55,7 @@ class Plot:
     logarithmic: str = ""
     limit: float | None = None
     note: str = ""
+    least: float = 0.0
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -76,7 +80,7 @@ def code(text: str) -> str:
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], explained: Sequence[str] = ()) -> str:
     """A table that scrolls by itself where the page is narrow; ``explained`` says what each column is."""
     told = list(explained) or [""] * len(header)
-    texts = [not any(any(c.isdigit() for c in row[k]) for row in rows) for k in range(len(header))]
+    texts = [not any(_NUMBER.match(row[k]) for row in rows) for k in range(len(header))]
     kinds = [' class="text"' if text else "" for text in texts]  # columns without any number stand on the left
     titles = [f' title="{html.escape(text)}"' if text else "" for text in told]
     head = "".join(f"<th{k}{t}>{html.escape(c)}</th>" for c, k, t in zip(header, kinds, titles, strict=True))
@@ -94,6 +98,7 @@ def figure(plot: Plot) -> str:
         "y": plot.y_label,
         "logarithmic": "".join(axis for axis in plot.logarithmic if _positive(plot, axis)),
         "limit": plot.limit,
+        "least": plot.least,
         "curves": [
             {
                 "label": curve.label,

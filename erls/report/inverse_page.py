@@ -75,7 +75,7 @@ def _rows(inversion: Inversion) -> list[tuple[str, ...]]:
 
 def inversion_page(inversion: Inversion, elastic: Confirmation | None, rigid: Confirmation | None) -> str:
     """One self-contained HTML page."""
-    parts = [paragraph(text) for text in _words(inversion, elastic, rigid)]
+    parts = [paragraph(line) for text in _words(inversion, elastic, rigid) for line in text.splitlines()]
     parts += [paragraph(text, "note") for text in inversion.warnings]
     parts += [html_table(_HEAD, _rows(inversion)), heading("Efforts")]
     units = {joint.name: joint.freedom.units for joint in inversion.problem.mechanism.joints}
@@ -85,8 +85,9 @@ def inversion_page(inversion: Inversion, elastic: Confirmation | None, rigid: Co
             Curve("rigid links", inversion.t, inversion.rigid_efforts[name][: len(effort)], dashed=True),
         ]
         parts.append(figure(Plot(name, "time [s]", f"effort [{units[name][1]}]", curves)))
-    parts.append(heading("Internal motion"))
-    parts.append(figure(Plot("Deflection", "time [s]", "[m]", [Curve("largest", inversion.t, inversion.deflection)])))
+    if inversion.deflection.any():
+        curves = [Curve("largest", inversion.t, inversion.deflection)]
+        parts += [heading("Internal motion"), figure(Plot("Deflection", "time [s]", "[m]", curves))]
     if elastic is not None:
         parts += [heading("What forward runs miss"), *_misses(inversion, elastic, rigid)]
     return page(f"{inversion.problem.scene.name}: inverse dynamics", parts)

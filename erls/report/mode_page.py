@@ -17,6 +17,7 @@ from erls.report.tables import table
 from erls.studies.mode_result import SUCCESSIVE, ModeStudy, Point
 
 _LARGEST_FILE = 1_000_000
+_NAME = 16  # characters of what a terminal shows of a name
 _READING = "largest change of each figure over the run from the row above"
 _COLUMN = re.compile(r"joint .+|point .+ [xyz]")
 
@@ -137,7 +138,7 @@ def _figure(point: Point, column: str, time: float) -> str:
 def mode_study_text(study: ModeStudy, printed: Printed | None = None) -> str:
     """Changes from count to count, and the verdict, for the terminal."""
     what = f"modes of link {study.link!r}" if study.link else "elastic modes, all links alike"
-    parts = [f"{study.scene}: {what}; {_READING}", table(*_change_rows(study)), verdict(study)]
+    parts = [f"{study.scene}: {what}; {_READING}", table(*_short_rows(study)), verdict(study)]
     if printed is not None:
         parts.append(f"Published figures at t = {printed.time:g} s: {printed.note}\n" + table(*beside(study, printed)))
     return "\n\n".join(parts)
@@ -150,6 +151,8 @@ def verdict(study: ModeStudy) -> str:
     if study.converged is not None:
         return f"converged at {study.converged} elastic modes: {SUCCESSIVE} successive changes below {limits}"
     text = f"NOT converged: there are no {SUCCESSIVE} successive changes below {limits}"
+    if study.exhausted:
+        text = f"complete: all {study.points[-1].modes} elastic modes that there are have been taken"
     last = next((p for p in reversed(study.points) if p.changes), None)
     if last is not None and not last.unchanged:
         c = last.changes[0]
@@ -165,7 +168,7 @@ def verdict(study: ModeStudy) -> str:
 
 def mode_study_page(study: ModeStudy, printed: Printed | None = None) -> str:
     """One self-contained HTML page."""
-    parts = [paragraph(verdict(study), "good" if study.converged is not None else "bad")]
+    parts = [paragraph(verdict(study), "good" if study.converged is not None or study.exhausted else "bad")]
     parts += [heading("Changes from one count to the next"), paragraph(_READING, "note")]
     parts.append(html_table(*_change_rows(study)))
     if printed is not None:
@@ -192,11 +195,43 @@ def _change_rows(study: ModeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...
     return ("elastic modes", "time [s]", *(f"{n} [{units[n]}]" for n in names), "all within tolerance"), rows
 
 
+_SHORT = {
+    "point": "points [m]",
+    "angle": "angles [rad]",
+    "force": "forces",
+    "moment": "moments",
+    "effort": "efforts",
+    "section-force": "N, V",
+    "section-moment": "T, M",
+    "stress": "stress",
+    "spectrum": "peaks",
+}
+"""Heads of the largest changes of each kind; loads relative to their peaks, peaks of spectra to their frequency."""
+
+
+def _short_rows(study: ModeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
+    """The largest change of each kind, and what changed most for its tolerance, within 100 columns of a terminal."""
+    kinds = [kind for kind in _SHORT if any(_of_kind(p, kind) for p in study.points)]
+    rows = []
+    for p in study.points:
+        worst = p.changes[0].output if p.changes else "failed" if p.outputs is None else ""
+        worst = worst if len(worst) <= _NAME else f"{worst[: _NAME - 1]}…"
+        cells = [f"{max(found):.1e}" if (found := _of_kind(p, kind)) else "" for kind in kinds]
+        wall = "" if p.outputs is None else f"{p.outputs.summary['wall_s']:.2f}"
+        rows.append((str(p.modes), wall, *cells, worst, "" if not p.changes else "yes" if p.unchanged else "no"))
+    return ("modes", "time", *(_SHORT[kind] for kind in kinds), "worst", "ok"), rows
+
+
+def _of_kind(point: Point, kind: str) -> list[float]:
+    return [change.value for change in point.changes if change.output.split()[0] == kind]
+
+
 def _plots(study: ModeStudy) -> list[Plot]:
     done = [p for p in study.points if p.changes]
     plots = []
     for kind, unit in (
         ("point", "m"), ("angle", "rad or m"), ("force", "of peak"), ("moment", "of peak"), ("effort", "of peak"),
+        ("section-force", "of peak"), ("section-moment", "of peak"), ("stress", "of peak"),
     ):  # fmt: skip
         names = sorted({c.output for p in done for c in p.changes if c.output.split()[0] == kind})
         curves = []
@@ -207,7 +242,7 @@ def _plots(study: ModeStudy) -> list[Plot]:
                 curves.append(Curve(name, counts, values, marked=True))
         if curves:
             limit = study.tolerances.position if kind == "point" else None
-            limit = study.tolerances.load if kind in ("force", "moment", "effort") else limit
+            limit = study.tolerances.load if unit == "of peak" else limit
             plots.append(
                 Plot(f"change of {kind} from the count before", "elastic modes", f"change [{unit}]", curves, "y", limit)
             )

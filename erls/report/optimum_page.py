@@ -169,7 +169,7 @@ def _histories(o: Outcome) -> list[Plot]:
     passed = Curve(o.method, count, np.array([a.violation for a in o.history]), marked=True)
     return [
         Plot("Objective", "analysis", "objective", [objective]),
-        Plot("Violation", "analysis", "largest share by which a limit is passed", [passed], limit=0.0),
+        Plot("Violation", "analysis", "share beyond the limit", [passed], limit=0.0),
     ]
 
 
@@ -208,4 +208,4 @@ def _numbers(values: Sequence[float]) -> list[str]:
 
 
 def _share(value: float) -> str:
-    return f"{100 * value:.3f} %"
+    return f"{round(100 * value, 3) + 0.0:.3f} %"  # never -0.000

@@ -29,7 +29,7 @@ def sweep_summary(found: Sweep) -> dict[str, Any]:
             {"cause": cause, "points": count, "first": next(r.message for r in found.failed if r.cause == cause)}
             for cause, count in Counter(row.cause for row in found.failed).most_common()
         ],
-        "bending_looked_at_every": found.bending_every,
+        "bending_looked_at": found.looked_at,
         "warned": sum(bool(row.warnings) for row in found.rows),
         "integration_s": found.integration_s,
         "wall_s": found.wall_s,
@@ -70,9 +70,9 @@ def sweep_text(found: Sweep) -> str:
     lines.append(table(("quantity", "least", "mean", "largest", "least at", "largest at"), rows))
     for failure in told["failures"]:
         lines += ["", f"{failure['points']} failed, {failure['cause']}; the first: {failure['first']}"]
-    if told["bending_looked_at_every"] > 1:
-        every = told["bending_looked_at_every"]
-        lines += ["", f"how far off links are that bend was looked at in one of {every} points; --verdict does in all"]
+    if told["bending_looked_at"] < len(found.rows):
+        looked = f"{told['bending_looked_at']} of {len(found.rows)} points"
+        lines += ["", f"how far off links are that bend was looked at in {looked}; --verdict does in all"]
     if told["warned"]:
         text = next(row.warnings[0] for row in found.rows if row.warnings)
         lines += ["", f"{told['warned']} runs warned; the first: {text}"]

@@ -56,7 +56,11 @@ class Built:
     """A mechanism, and what the user should know about how it came about."""
 
     mechanism: Mechanism
-    warnings: tuple[str, ...]
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What was found while it was built."""
+        return self.mechanism.remarks
 
 
 def cache_folder() -> Path:
@@ -110,9 +114,11 @@ def build_mechanism(
         replace(link, pieces=piece_links(given, link, own, f"{file}: links[{k}]")) if own else link
         for k, (link, given, own) in enumerate(zip(links, record.links, pieces or [()] * len(links), strict=True))
     ]
-    warnings = interface_gaps(record, rows, links)
-    warnings += [f"link {link.name!r}: {text}" for link in links if (text := link.model.provenance.get(KEPT_WHOLE))]
-    warnings += [w for link in links for w in piece_warnings(link)]
+    effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
+    told = interface_gaps(record, rows, links)
+    told += [f"link {link.name!r}: {text}" for link in links if (text := link.model.provenance.get(KEPT_WHOLE))]
+    told += [w for link in links for w in piece_warnings(link)]
+    told += inconsistencies(effects, record.simulation.formulation)
     points = [_point(scene, k, links) for k in range(len(record.points))]
     whole = expand(rows, _with_payloads(scene, rows, links, points))
     chain = Mechanism(
@@ -127,13 +133,13 @@ def build_mechanism(
         allow_unstable=record.initial.allow_unstable,
         elastic_assembly=record.initial.assemble == "elastic",
         bandwidth=record.simulation.bandwidth,
+        remarks=tuple(told),
     )
-    effects = named_effects(record.simulation.effects, f"{file}: simulation.effects")
     chain, circuits = with_circuits(scene, chain)
     loops = build_loops(scene, chain)
     closing = loops + build_bushings(scene, chain) + build_couplings(scene, chain, loops) + circuits
     chain = without(replace(chain, loops=closing, effects=effects), ALL - effects)
-    return Built(chain, (*warnings, *inconsistencies(effects, record.simulation.formulation)))
+    return Built(chain)
 
 
 def link_models(scene: Scene, tell: Message) -> list[ModalModel]:
@@ -244,7 +250,7 @@ def link_model(scene: Scene, k: int, tell: Message, description: LinkFile | None
             )
     else:
         given = _within(f"{place}.model", lambda: link_description(scene, link))
-        model, cached = reduce_cached(given, cache_folder(), tell)
+        model, cached = reduce_cached(given, cache_folder(), tell, passing=bool(link.changes))
         tell(f"{link.name}: {'reduction from the cache' if cached else 'reduced'} ({given.path.name})")
     model = _warmed(model, link, place)
     wanted = 0 if not link.flexible else link.elastic_modes

@@ -136,9 +136,7 @@ def _motion(
 ) -> Joint:
     place = replace(place, revolute=freedom.turns)
     drive = build_drive(record.drive, place.folder, place.field("drive"), freedom.turns)
-    start = place.at("initial")
-    position = angle(start, "position", record.initial.position, record.initial.position_deg)
-    rate = angle(start, "rate", record.initial.rate, record.initial.rate_deg)
+    position, rate = initial_motion(record, place)
     if drive.prescribed:
         if any(getattr(record.initial, f) is not None for f in record.initial.__struct_fields__):
             raise place.error(
@@ -149,6 +147,19 @@ def _motion(
         position, rate, _ = drive.reference(0.0)  # type: ignore[misc]
     forces, rotor = joint_forces(record, place), reflected_inertia(record, place)
     return Joint(name, freedom, before, after, forces, rotor, drive, position, rate)
+
+
+def initial_motion(record: JointRecord | Coordinate, place: Place) -> tuple[float, float]:
+    """Coordinate and rate at the start of a joint that is free to have any.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD.
+    """
+    initial, start = record.initial, place.at("initial")
+    position = angle(start, "position", initial.position, initial.position_deg)
+    return position, angle(start, "rate", initial.rate, initial.rate_deg)
 
 
 def angle(place: Place, name: str, plain: float | None, degrees: float | None) -> float:

@@ -71,8 +71,7 @@ def _size(gaps: Sequence[Array]) -> float:
 
 
 def _told(interface: str, gap: Array, link: Link, joint: str, remedy: str) -> list[str]:
-    size = float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
-    limit = SMALLEST * max(size, 1e-9)
+    limit = SMALLEST * max(link.size, 1e-9)
     ways = zip(gap[::-1], ("off", "along"), strict=True)
     parts = [f"{value:.4g} m {where}" for value, where in ways if value > limit]
     if not parts:

@@ -32,8 +32,19 @@ def apply_override(data: dict[str, Any], text: str) -> None:
     where = f"--set {text}"
     if not equals or not all(key.strip().split(".")):
         raise SceneError(Cause.BAD_FIELD, "not of the form KEY=VALUE", where=where, remedy="e.g. simulation.step=1e-4")
+    set_field(data, key, value_of(value), where)
+
+
+def set_field(data: dict[str, Any], key: str, value: Any, where: str) -> None:
+    """Set a value, as TOML has it, in parsed TOML; ``where`` stands in messages.
+
+    Raises
+    ------
+    SceneError
+        No such place.
+    """
     at, place = place_of(data, in_scene(_SHORT.get(key.strip(), key.strip())), where, SceneError)
-    at[place] = value_of(value)
+    at[place] = value
 
 
 def value_of(text: str) -> Any:

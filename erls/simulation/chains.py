@@ -8,7 +8,7 @@ from dataclasses import replace
 from functools import partial
 
 from erls.accuracy.kernels import kernels_of
-from erls.equations.registry import FORMULATIONS, formulate
+from erls.equations.registry import FORMULATIONS, formulate, share
 from erls.errors import SceneError
 from erls.integrate.base import Solution
 from erls.integrate.charts import joined
@@ -24,6 +24,7 @@ from erls.run.watches.watching import Warnings, Watching
 from erls.scene.build import Built, Elements, build_mechanism
 from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
+from erls.scene.rebuild import rebuilt
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
 from erls.simulation.statements import with_statement
@@ -97,8 +98,11 @@ def build_like(scene: Scene, like: ChainRun, tell: Callable[[str], None] = lambd
     """The mechanism of a scene whose links and effects are those of a run: modal models serve again, and with them what
     was found of links that are the same to the last payload.
     """
+    mechanism = like.formulation.mechanism
+    if (found := rebuilt(scene, like.scene.record, mechanism)) is not None:
+        return found
     built = build_mechanism(scene, tell, *models_of(like))
-    return replace(built, mechanism=sharing_links(built.mechanism, like.formulation.mechanism))
+    return replace(built, mechanism=sharing_links(built.mechanism, mechanism))
 
 
 def run_mechanism(
@@ -113,6 +117,8 @@ def run_mechanism(
     steps = compiled_steps(mechanism, settings)
     with announcing(asked.tell), compiling_beside(*later), compiling_steps(steps):
         formulation = formulate(mechanism, settings)
+        if asked.like is not None:
+            share(formulation, asked.like.formulation)
         compile_kernels(formulation, settings)
     if before is None:
         start, spent, state = 0.0, 0.0, formulation.initial_state()

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 import msgspec
 
@@ -18,7 +19,7 @@ from erls.scene.bodies.schema import BodyScene
 from erls.scene.build import build_mechanism
 from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
-from erls.scene.overrides import apply_override
+from erls.scene.overrides import apply_override, set_field
 from erls.scene.read import AnyScene, scene_with
 from erls.simulation.asked import Asked
 from erls.simulation.packed_run import Packed, PackedBodies, unpacked, unpacked_bodies
@@ -26,6 +27,7 @@ from erls.simulation.simulate import Progress, run_as_asked
 from fe_import.errors import ReportedError
 from fe_import.files.toml import read_toml
 
+Changes: TypeAlias = Sequence[tuple[str, Any]]
 _MOST_KEPT = 8  # sets of links
 
 
@@ -44,8 +46,15 @@ class Variants:
         self._tables: dict[str, Any] | None = None
         self._runs: dict[tuple[bytes, bool, Any], ChainRun] = {}
 
-    def scene(self, overrides: Sequence[str]) -> AnyScene:
+    def scene(self, overrides: Sequence[str], changes: Changes = ()) -> AnyScene:
         """A variant.
+
+        Parameters
+        ----------
+        overrides : sequence of str
+            ``KEY=VALUE``.
+        changes : sequence of (str, value)
+            The same as values, of numbers, words and lists of them, which need not be read.
 
         Raises
         ------
@@ -57,10 +66,18 @@ class Variants:
             for text in self.common:
                 apply_override(found, text)
             self._tables = found
-        return scene_with(_copied(self._tables), self.path, overrides)
+        tables = _copied(self._tables)
+        for key, value in changes:
+            set_field(tables, key, _plain(value), f"--set {key}={value}")
+        return scene_with(tables, self.path, overrides)
 
     def run(
-        self, overrides: Sequence[str], progress: Progress, verdict: bool = True, bending: bool = True
+        self,
+        overrides: Sequence[str],
+        progress: Progress,
+        verdict: bool = True,
+        bending: bool = True,
+        changes: Changes = (),
     ) -> Run | ReportedError:
         """The run of a variant, or its failure.
 
@@ -73,10 +90,12 @@ class Variants:
             Whether the run states its error.
         bending : bool
             Whether it looks at how far off links are that bend, without a verdict, too.
+        changes : sequence of (str, value)
+            As of `scene`.
         """
         try:
             progress(0.0, 0.0)
-            scene = self.scene(overrides)
+            scene = self.scene(overrides, changes)
             like = self._alike(scene)
             asked = Asked(progress, lambda text: None, None, False, like, verdict, bending=bending or verdict)
             run = run_as_asked(scene, asked)
@@ -115,6 +134,11 @@ class Variants:
             self._runs.setdefault(_links(run.scene), run)
         if len(self._runs) > _MOST_KEPT:
             self._runs.pop(next(iter(self._runs)))
+
+
+def _plain(value: Any) -> Any:
+    """What TOML would have made of a value."""
+    return value if type(value) in (bool, int, float, str) else json.loads(json.dumps(value))
 
 
 def _copied(tables: Any) -> Any:

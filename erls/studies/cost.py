@@ -106,7 +106,19 @@ def study_cost(
         fields = tuple(count_field(loaded, name) for name in modes)
         until = begun + budget + truth.prepared_s
         tasks = [
-            Ladder(str(path), tuple(overrides), fields, ladder, chosen, norm, truth, tolerance, budget / 10, until)
+            Ladder(
+                path=str(path),
+                overrides=tuple(overrides),
+                fields=fields,
+                rungs=ladder,
+                points=chosen,
+                norm=norm,
+                reference=truth,
+                tolerance=tolerance,
+                slowest=budget / 10,
+                until=until,
+                named=bool(grid.integrators),
+            )
             for ladder in rungs
         ]
         known = KeptRuns(kept, [replace(task, path="", until=0.0) for task in tasks], list[CostPoint], _whole)

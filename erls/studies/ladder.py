@@ -14,10 +14,12 @@ from erls.scene.read import load_chain
 from erls.simulation.simulate import simulate
 from erls.studies.doubts import foretold_error
 from erls.studies.effect_sets import as_field
+from erls.studies.explicit import is_explicit, too_stiff
 from erls.studies.reference import Reference, sampled
 from fe_import.errors import ReportedError
 
 Norm = Literal["max", "rms"]
+_UNNAMED = 1 / 40  # of what others may take
 
 
 @dataclass(frozen=True)
@@ -82,7 +84,11 @@ class CostPoint:
 
 @dataclass(frozen=True)
 class Ladder:
-    """Task of one worker process."""
+    """Task of one worker process.
+
+    Explicit methods that nobody has asked for by name (``named``) may take less than others, and are not tried where
+    stability limits their steps by much.
+    """
 
     path: str
     overrides: tuple[str, ...]
@@ -94,6 +100,7 @@ class Ladder:
     tolerance: float
     slowest: float
     until: float
+    named: bool = False
 
 
 def overrides_of(setting: Setting, fields: Sequence[str]) -> tuple[str, ...]:
@@ -160,6 +167,10 @@ def _measured(task: Ladder, setting: Setting, longest: float, first: bool) -> Co
     walls: list[float] = []
     try:
         scene = load_chain(task.path, (*task.overrides, *overrides_of(setting, task.fields)))
+        if first and not task.named and (stiff := too_stiff(scene)) is not None:
+            return failed(setting, stiff)
+        if is_explicit(setting.integrator) and not task.named:
+            longest = min(longest, _UNNAMED * task.slowest)
         wanted = 1
         while len(walls) < wanted and (not walls or time.monotonic() < task.until):
             begun = None
@@ -167,7 +178,10 @@ def _measured(task: Ladder, setting: Setting, longest: float, first: bool) -> Co
             walls.append(run.wall_s + (0.0 if run.certificate is None else run.certificate.wall_s))
             wanted = warms + 3 if run.wall_s < 1.0 else warms + 1 if run.wall_s < longest / 4 else 1
     except _TooSlow:
-        why = "too slow for this study" if longest >= task.slowest else "the budget of the study was used up"
+        if (stiff := too_stiff(scene)) is not None:
+            return failed(setting, stiff)
+        spent = task.until <= time.monotonic()
+        why = "the budget of the study was used up" if spent else "too slow for this study"
         return failed(setting, _over_budget(f"stopped after {longest:.1f} s: {why}"))
     except ReportedError as problem:
         if problem.cause == Cause.INTERRUPTED:

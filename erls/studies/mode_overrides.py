@@ -2,20 +2,39 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
+from erls.maths.so3 import Array
 from erls.scene.chain import Scene
 from fe_import.description.link import load_link
 from fe_import.description.reduction import Reduction
+from fe_import.modal.equal_frequencies import whole_count
 
 
-def available_modes(scene: Scene) -> dict[str, int]:
-    """Elastic modes of each elastic link; reduces what is not in the cache, before workers would do so at once."""
+def elastic_frequencies(scene: Scene) -> dict[str, Array]:
+    """(m,) frequencies of the elastic modes of each elastic link [Hz]; reduces what is not in the cache, before workers
+    would do so at once.
+    """
     from erls.scene.build import link_models
 
     models = link_models(scene, lambda text: None)
     return {
-        link.name: model.elastic_modes
+        link.name: model.frequencies_hz[6:]
         for link, model in zip(scene.record.links, models, strict=True)
         if model.elastic_modes
+    }
+
+
+def available_modes(scene: Scene) -> dict[str, int]:
+    """How many elastic modes each elastic link has."""
+    return {name: len(found) for name, found in elastic_frequencies(scene).items()}
+
+
+def whole_counts(scene: Scene, wanted: Mapping[str, int], known: Mapping[str, Array]) -> dict[str, int]:
+    """Counts of elastic modes by link that part no modes of equal frequency, where the lowest ones are counted."""
+    return {
+        name: whole_count(known[name], count) if count_field(scene, name) == f"links.{name}.elastic_modes" else count
+        for name, count in wanted.items()
     }
 
 

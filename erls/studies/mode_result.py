@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -59,8 +59,8 @@ class Point:
 
     Attributes
     ----------
-    modes : int
-        Elastic modes.
+    counts : dict of str to int
+        Elastic modes by link.
     outputs : Outputs or None
         None when the run failed.
     error : ReportedError or None
@@ -68,10 +68,15 @@ class Point:
         Against the run before, the largest ratio first; empty for the first run.
     """
 
-    modes: int
+    counts: Mapping[str, int]
     outputs: Outputs | None
     error: ReportedError | None
     changes: tuple[Change, ...]
+
+    @property
+    def modes(self) -> int:
+        """Elastic modes, of the link that has most."""
+        return max(self.counts.values())
 
     @property
     def unchanged(self) -> bool:
@@ -97,6 +102,8 @@ class ModeStudy:
         Kinds of the modes that the last step added, with their share of the elastic energy there, largest first.
     complete : bool
         False after an interrupt.
+    available : dict of str to int
+        Elastic modes that there are of each link.
     """
 
     scene: str
@@ -106,6 +113,13 @@ class ModeStudy:
     converged: int | None
     remaining: tuple[tuple[str, float], ...]
     complete: bool
+    available: Mapping[str, int]
+
+    @property
+    def exhausted(self) -> bool:
+        """Whether all modes that there are have been taken."""
+        last = self.points[-1] if self.points else None
+        return last is not None and last.outputs is not None and last.counts == self.available
 
 
 def changed(before: Outputs, after: Outputs, limits: Tolerances) -> tuple[Change, ...]:
@@ -122,6 +136,9 @@ def changed(before: Outputs, after: Outputs, limits: Tolerances) -> tuple[Change
         for name in new:
             value = relative_change(old[name], new[name])
             found.append(Change(f"{kind[:-1]} {name}", value, "of peak", value / limits.load))
+    for name in after.recovered.keys() & before.recovered.keys():
+        value = relative_change(before.recovered[name], after.recovered[name])
+        found.append(Change(name, value, "of peak", value / limits.load))
     for name in after.accelerations:
         value = _peak_change(before, after, name)
         found.append(Change(f"spectrum {name}", value, "of frequency", value / limits.frequency))
@@ -162,7 +179,8 @@ def remaining_kinds(points: Sequence[Point]) -> tuple[tuple[str, float], ...]:
     shares: dict[str, float] = {}
     last = done[-1].outputs
     for name, energy in last.mode_energy.items():
-        for kind, share in list(zip(last.mode_kinds[name], energy, strict=True))[done[-2].modes :]:
+        before = done[-2].counts.get(name, len(energy))
+        for kind, share in list(zip(last.mode_kinds[name], energy, strict=True))[before:]:
             shares[kind] = shares.get(kind, 0.0) + float(share)
     return tuple(sorted(shares.items(), key=lambda item: -item[1]))
 
@@ -181,9 +199,11 @@ def study_summary(study: ModeStudy) -> dict[str, Any]:
         "converged": study.converged,
         "remaining": [{"kind": kind, "share": share} for kind, share in study.remaining],
         "complete": study.complete,
+        "all_modes_taken": study.exhausted,
         "points": [
             {
                 "elastic_modes": p.modes,
+                "by_link": dict(p.counts),
                 "wall_s": None if p.outputs is None else p.outputs.summary["wall_s"],
                 "error": None if p.error is None else p.error.as_dict(),
                 "changes": [

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,9 @@ from erls.mechanism.sensors.base import Node
 from erls.run.chain.instants import Instants
 from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
+from fe_import.modal.recovery_maps import von_mises
+
+_RECOVERED = 200  # times at most of what is recovered, beside the start
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,9 @@ class Outputs:
         [Hz]
     summary : dict
         The JSON of ``erls simulate``.
+    recovered : dict of (k,) arrays
+        Where asked for: largest stress (von Mises) of solid links [Pa], largest section force [N] and moment [N m] of
+        frames, at up to 201 times, by ``stress LINK``, ``section-force LINK`` and ``section-moment LINK``.
     """
 
     times: Array
@@ -64,9 +70,10 @@ class Outputs:
     mode_kinds: dict[str, tuple[str, ...]]
     mode_frequencies: dict[str, Array]
     summary: dict[str, Any]
+    recovered: dict[str, Array] = field(default_factory=dict)
 
 
-def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
+def run_outputs(run: ChainRun, times: Sequence[float] | Array, recovering: bool = False) -> Outputs:
     """Sample a run.
 
     Parameters
@@ -74,6 +81,8 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
     run : ChainRun
     times : (k,) array
         Within the run [s].
+    recovering : bool
+        Whether stress and section forces are asked for.
     """
     formulation, s = run.formulation, run.solution
     t = np.clip(np.asarray(times, dtype=float), s.t[0], s.t[-1])
@@ -105,7 +114,26 @@ def run_outputs(run: ChainRun, times: Sequence[float] | Array) -> Outputs:
         mode_kinds={name: m.kinds[6:] for name, m in models.items()},
         mode_frequencies={name: m.frequencies_hz[6:] for name, m in models.items()},
         summary=run.summary(),
+        recovered=_recovered(run, t[:: max(1, len(t) // _RECOVERED)]) if recovering else {},
     )
+
+
+def _recovered(run: ChainRun, times: Array) -> dict[str, Array]:
+    """Of links that hold something to recover from."""
+    from erls.run.recovery import section_forces, stress  # here: most runs are not asked for it
+
+    found = {}
+    for name in run.link_names:
+        model = run.formulation.mechanism.links[run.link_number(name)].model
+        if model.recovery is None or not model.elastic_modes:
+            continue
+        if model.recovery.quantity == "stress":
+            found[f"stress {name}"] = von_mises(stress(run, name, times)).max(axis=1)
+        else:
+            forces = section_forces(run, name, times)
+            for kind, part in (("force", forces[..., :3]), ("moment", forces[..., 3:])):
+                found[f"section-{kind} {name}"] = np.linalg.norm(part, axis=-1).max(axis=1)
+    return found
 
 
 def _deflection(run: ChainRun, state: State) -> float:

@@ -41,7 +41,7 @@ class ChainFigure(Figure):
     def size(self) -> float:
         """Of the largest link [m]."""
         links = self.run.formulation.mechanism.links
-        return max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in links)
+        return max(link.size for link in links)
 
     def fixed(self) -> Array:
         """(n, 3) joints on the ground."""

@@ -26,6 +26,7 @@ if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
     from erls.run.bodies.rest import BodyPath
 
 _TIMES = 1001
+_NOTHING = 1e-9  # of the largest load of a kind: what rounding leaves
 _PROGRAMS = ("erls", "numpy", "scipy", "numba", "h5py")
 _PARTS = {
     "integration": "steps and iterations, over the whole run",
@@ -191,12 +192,17 @@ def _histories(x: str, along: Array, found: Sequence[tuple[str, Quantity]]) -> I
     loads = [(name, q) for name, q in vectors if q.unit != "m"]
     if loads:
         yield heading("Forces and moments")
-        yield from (_vector(x, along, name, q) for name, q in loads)
+        largest = {q.unit: max(_largest(one) for _, one in loads if one.unit == q.unit) for _, q in loads}
+        yield from (_vector(x, along, name, q, _NOTHING * largest[q.unit]) for name, q in loads)
 
 
-def _vector(x: str, along: Array, name: str, q: Quantity) -> str:
+def _largest(q: Quantity) -> float:
+    return float(np.abs(q.values[np.isfinite(q.values)]).max(initial=0.0))
+
+
+def _vector(x: str, along: Array, name: str, q: Quantity, least: float = 0.0) -> str:
     curves = [Curve(axis, along, q.values[:, k]) for k, axis in enumerate("xyz")]
-    return figure(Plot(name, x, f"[{q.unit}]", curves, note="world axes"))
+    return figure(Plot(name, x, f"[{q.unit}]", curves, note="world axes", least=least))
 
 
 def _modes(run: ChainRun, times: Array) -> Iterator[str]:

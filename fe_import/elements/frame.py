@@ -8,12 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
 from fe_import.elements.sections import SectionConstants
-from fe_import.model import Array, BeamLines, IntArray, ThermalLoad
+from fe_import.model import Array, BeamLines, ThermalLoad
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(4)  # exact for the sixth-degree products of the shape functions
 _POINTS, _WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -23,12 +24,12 @@ STIFFNESS_PARTS = ("axial", "torsion", "bending about y", "bending about z")
 
 @dataclass(frozen=True)
 class FrameElement:
-    """One straight element.
+    """One straight element, or many (`stacked`), whose numbers are then arrays (e,).
 
     Attributes
     ----------
-    nodes : (int, int)
-    axes : (3, 3) array
+    nodes : (int, int), or (e, 2) array
+    axes : (3, 3) array, or (e, 3, 3)
         Rows are the local x, y, z axes in the mesh frame.
     length : float
         [m]
@@ -41,35 +42,50 @@ class FrameElement:
         [1/K]
     """
 
-    nodes: tuple[int, int]
+    nodes: Any
     axes: Array
-    length: float
+    length: Any
     section: SectionConstants
-    youngs_modulus: float
-    shear_modulus: float
-    density: float
-    thermal_expansion: float = 0.0
+    youngs_modulus: Any
+    shear_modulus: Any
+    density: Any
+    thermal_expansion: Any = 0.0
+
+
+def stacked(elements: Sequence[FrameElement]) -> FrameElement:
+    """All of them as one."""
+    sections: list[dict[str, Any]] = [vars(element.section) for element in elements]
+    section: dict[str, Any] = {name: np.array([each[name] for each in sections]) for name in sections[0]}
+    numbers = ("length", "youngs_modulus", "shear_modulus", "density", "thermal_expansion")
+    return FrameElement(
+        nodes=np.array([element.nodes for element in elements], dtype=np.int64),
+        axes=np.stack([element.axes for element in elements]),
+        section=SectionConstants(**section),
+        **{name: np.array([getattr(element, name) for element in elements]) for name in numbers},
+    )
 
 
 def local_axes(start: Array, end: Array, local_z: Array) -> Array:
-    """(3, 3) rows: unit x from ``start`` to ``end``, z as near ``local_z`` as possible, y = z × x."""
-    x = (end - start) / np.linalg.norm(end - start)
+    """(..., 3, 3) rows: unit x from ``start`` to ``end``, z as near ``local_z`` as possible, y = z × x."""
+    x = (end - start) / np.linalg.norm(end - start, axis=-1, keepdims=True)
     y = np.cross(local_z, x)
-    y /= np.linalg.norm(y)
-    return np.stack([x, y, np.cross(x, y)])
+    y /= np.linalg.norm(y, axis=-1, keepdims=True)
+    return np.stack([x, y, np.cross(x, y)], axis=-2)
 
 
-def shear_flexibility(element: FrameElement, shear: bool) -> tuple[float, float]:
+def shear_flexibility(element: FrameElement, shear: bool) -> tuple[Any, Any]:
     """Φ_y = 12 E I_z / (κ_y G A L²) for bending about z (deflection along y), and Φ_z likewise; 0 without shear."""
     if not shear:
-        return 0.0, 0.0
+        return (np.zeros(np.shape(element.length)),) * 2
     s, g = element.section, element.shear_modulus * element.section.area * element.length**2
     e = 12 * element.youngs_modulus
     return e * s.inertia_z / (s.shear_factor_y * g), e * s.inertia_y / (s.shear_factor_z * g)
 
 
-def bending_shapes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
-    """Deflection and rotation of the cross section at ξ = x/L per unit (v₁, θ₁, v₂, θ₂), each (points, 4)."""
+def bending_shapes(xi: Array, length: Array | float, phi: Array | float) -> tuple[Array, Array]:
+    """Deflection and rotation of the cross section at ξ = x/L per unit (v₁, θ₁, v₂, θ₂), each (..., points, 4), of
+    elements with lengths and Φ (..., 1), or of one.
+    """
     x2, x3 = xi**2, xi**3
     bubble = phi / 2 * (xi - x2)
     deflection = np.stack(
@@ -90,7 +106,8 @@ def bending_shapes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
         ],
         axis=-1,
     )
-    return deflection / (1 + phi), slope / (1 + phi)
+    whole = np.asarray(1 + phi)[..., None]
+    return deflection / whole, slope / whole
 
 
 def deflection_slopes(xi: Array, length: float, phi: float) -> Array:
@@ -119,28 +136,33 @@ def _scalar(element: FrameElement) -> np.dtype[np.generic]:
 
 
 def element_stiffness(element: FrameElement, shear: bool) -> dict[str, Array]:
-    """(12, 12) stiffness in local axes, split into axial, torsion and the two bendings."""
-    s, length, e = element.section, element.length, element.youngs_modulus
-    parts = {name: np.zeros((12, 12), _scalar(element)) for name in STIFFNESS_PARTS}
+    """(..., 12, 12) stiffness in local axes, split into axial, torsion and the two bendings."""
+    s, length, e = element.section, np.asarray(element.length), element.youngs_modulus
+    parts = {name: np.zeros((*length.shape, 12, 12), _scalar(element)) for name in STIFFNESS_PARTS}
     pair = np.array([[1.0, -1.0], [-1.0, 1.0]])
-    parts["axial"][np.ix_([0, 6], [0, 6])] = e * s.area / length * pair
-    parts["torsion"][np.ix_([3, 9], [3, 9])] = element.shear_modulus * s.torsion_constant / length * pair
+    parts["axial"][_places([0, 6])] = _wide(e * s.area / length) * pair
+    parts["torsion"][_places([3, 9])] = _wide(element.shear_modulus * s.torsion_constant / length) * pair
     phis = shear_flexibility(element, shear)
     for name, inertia, phi, (dofs, signs) in zip(
         ("bending about z", "bending about y"), (s.inertia_z, s.inertia_y), phis, _PLANES, strict=True
     ):
-        a, b = 6 * length, length**2
-        block = np.array(
-            [
-                [12, a, -12, a],
-                [a, (4 + phi) * b, -a, (2 - phi) * b],
-                [-12, -a, 12, -a],
-                [a, (2 - phi) * b, -a, (4 + phi) * b],
-            ]
-        )
-        block = block * (e * inertia / ((1 + phi) * length**3))
-        parts[name][np.ix_(dofs, dofs)] = block * np.outer(signs, signs)
+        a, b, c = 6 * length, length**2, np.full_like(length, 12.0)
+        near, far = (4 + phi) * b, (2 - phi) * b
+        rows = ((c, a, -c, a), (a, near, -a, far), (-c, -a, c, -a), (a, far, -a, near))
+        block = np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+        block = block * _wide(e * inertia / ((1 + phi) * length**3))
+        parts[name][_places(dofs)] = block * np.outer(signs, signs)
     return parts
+
+
+def _wide(numbers: Any) -> Array:
+    """(..., 1, 1) of numbers (...)."""
+    return np.asarray(numbers)[..., None, None]
+
+
+def _places(dofs: Any) -> tuple[Any, ...]:
+    """Rows and columns of matrices (..., 12, 12)."""
+    return (..., *np.ix_(dofs, dofs))
 
 
 def element_stretch(element: FrameElement, shear: bool) -> Array:
@@ -154,7 +176,7 @@ def element_stretch(element: FrameElement, shear: bool) -> Array:
 
 
 def element_mass(element: FrameElement, shear: bool, mass: str, rotary_inertia: bool) -> Array:
-    """(12, 12) mass matrix in local axes.
+    """(..., 12, 12) mass matrix in local axes.
 
     Parameters
     ----------
@@ -164,28 +186,31 @@ def element_mass(element: FrameElement, shear: bool, mass: str, rotary_inertia: 
         Whether cross sections resist turning, ρ diag(I_y + I_z, I_y, I_z) per length. Without it the consistent
         mass keeps the torsional part, the lumped one is made of point masses.
     """
-    s, length, rho = element.section, element.length, element.density
+    s, length, rho = element.section, np.asarray(element.length), element.density
     polar = s.inertia_y + s.inertia_z
-    result = np.zeros((12, 12), _scalar(element))
+    result = np.zeros((*length.shape, 12, 12), _scalar(element))
     if mass == "lumped":
-        node = np.zeros(6, result.dtype)
-        node[:3] = s.area
-        if rotary_inertia:
-            node[3:] = polar, s.inertia_y, s.inertia_z
-        np.fill_diagonal(result, np.tile(node * rho * length / 2, 2))
+        turning = (polar, s.inertia_y, s.inertia_z) if rotary_inertia else (0.0,) * 3
+        for place, share in enumerate((s.area, s.area, s.area, *turning) * 2):
+            result[..., place, place] = share * rho * length / 2
         return result
-    line = np.array([[2.0, 1.0], [1.0, 2.0]]) * rho * length / 6
-    result[np.ix_([0, 6], [0, 6])] = s.area * line
-    result[np.ix_([3, 9], [3, 9])] = polar * line
+    line = np.array([[2.0, 1.0], [1.0, 2.0]]) * _wide(rho) * _wide(length) / 6
+    result[_places([0, 6])] = _wide(s.area) * line
+    result[_places([3, 9])] = _wide(polar) * line
     for inertia, phi, (dofs, signs) in zip(
         (s.inertia_z, s.inertia_y), shear_flexibility(element, shear), _PLANES, strict=True
     ):
-        deflection, slope = bending_shapes(_POINTS, length, phi)
-        block = s.area * np.einsum("p,pi,pj->ij", _WEIGHTS, deflection, deflection)
+        deflection, slope = bending_shapes(_POINTS, length[..., None], np.asarray(phi)[..., None])
+        block = _wide(s.area) * _weighted(deflection)
         if rotary_inertia:
-            block = block + inertia * np.einsum("p,pi,pj->ij", _WEIGHTS, slope, slope)
-        result[np.ix_(dofs, dofs)] += rho * length * block * np.outer(signs, signs)
+            block = block + _wide(inertia) * _weighted(slope)
+        result[_places(dofs)] += _wide(rho * length) * block * np.outer(signs, signs)
     return result
+
+
+def _weighted(shapes: Array) -> Array:
+    """(..., 4, 4) integrals over ξ of products of shapes (..., points, 4)."""
+    return (shapes * _WEIGHTS[:, None]).swapaxes(-1, -2) @ shapes
 
 
 def assemble_frame(
@@ -208,44 +233,39 @@ def assemble_frame(
     parts : dict of sparse CSC
         The stiffness split by `STIFFNESS_PARTS`.
     """
-    rows: list[IntArray] = []
-    masses: list[Array] = []
-    parts: dict[str, list[Array]] = {name: [] for name in STIFFNESS_PARTS}
-    for element in elements:
-        turn = np.kron(np.eye(4), element.axes)
-        masses.append(turn.T @ element_mass(element, shear, mass, rotary_inertia) @ turn)
-        for name, block in element_stiffness(element, shear).items():
-            parts[name].append(turn.T @ block @ turn)
-        rows.append(np.concatenate([6 * n + np.arange(6) for n in element.nodes]))
-    dofs = np.stack(rows)
+    every = stacked(elements)
+    turn = np.zeros((len(elements), 12, 12))
+    for k in range(0, 12, 3):
+        turn[:, k : k + 3, k : k + 3] = every.axes
+    dofs = (6 * every.nodes[..., None] + np.arange(6)).reshape(-1, 12)
     i, j = np.repeat(dofs, 12, axis=1).ravel(), np.tile(dofs, (1, 12)).ravel()
     size = 6 * node_count
 
-    def assemble(blocks: list[Array]) -> sp.csc_array:
-        matrix = sp.coo_array((np.stack(blocks).ravel(), (i, j)), shape=(size, size)).tocsc()
+    def assemble(blocks: Array) -> sp.csc_array:
+        turned = turn.swapaxes(1, 2) @ blocks @ turn
+        matrix = sp.coo_array((turned.ravel(), (i, j)), shape=(size, size)).tocsc()
         return ((matrix + matrix.T) / 2).tocsc()
 
-    assembled = {name: assemble(blocks) for name, blocks in parts.items()}
+    assembled = {name: assemble(blocks) for name, blocks in element_stiffness(every, shear).items()}
     stiffness = sum(assembled.values(), start=sp.csc_array((size, size)))
-    return assemble(masses), stiffness.tocsc(), assembled
+    return assemble(element_mass(every, shear, mass, rotary_inertia)), stiffness.tocsc(), assembled
 
 
 def beam_lines(elements: Sequence[FrameElement], shear: bool, mass: str, rotary_inertia: bool) -> BeamLines:
     """Lines of frame elements; see `assemble_frame` for the options."""
-    polar = np.array([[e.section.inertia_y + e.section.inertia_z, e.section.inertia_y, e.section.inertia_z]
-                      for e in elements])  # fmt: skip
-    density = np.array([e.density for e in elements])
-    rotary = polar * density[:, None]
+    every = stacked(elements)
+    s, density = every.section, every.density
+    rotary = np.stack([s.inertia_y + s.inertia_z, s.inertia_y, s.inertia_z], axis=1) * density[:, None]
     if not rotary_inertia:
         rotary[:, 1:] = 0.0
         if mass == "lumped":
             rotary[:, 0] = 0.0
     return BeamLines(
-        nodes=np.array([e.nodes for e in elements], dtype=np.int64),
-        axes=np.stack([e.axes for e in elements]),
-        lengths=np.array([e.length for e in elements]),
-        shear=np.array([shear_flexibility(e, shear) for e in elements]),
-        mass=density * np.array([e.section.area for e in elements]),
+        nodes=every.nodes,
+        axes=every.axes,
+        lengths=every.length,
+        shear=np.stack(shear_flexibility(every, shear), axis=1),
+        mass=density * s.area,
         rotary=rotary,
         lumped=mass == "lumped",
     )

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_import.elements.frame import FrameElement, element_stiffness
+from fe_import.elements.frame import FrameElement, element_stiffness, stacked
 from fe_import.model import Array, IntArray
 
 
@@ -86,5 +86,5 @@ def frame_sections(
         site_nodes=np.array([e.nodes for e in elements], dtype=np.int64).ravel(),
         sets={name: np.array(sites, dtype=np.int64) for name, sites in sets.items()},
         axes=np.stack([e.axes for e in elements]),
-        stiffness=np.stack([sum(element_stiffness(e, shear).values(), start=np.zeros((12, 12))) for e in elements]),
+        stiffness=np.asarray(sum(element_stiffness(stacked(elements), shear).values())),
     )

@@ -333,6 +333,8 @@ def as_spelt(value: str, names: Collection[str]) -> str:
 
 def choose(value: str, options: Any, where: str, error: type[ReportedError] = FEImportError) -> None:
     """Refuse a name that is not among the options of a registry, with a suggestion."""
+    if isinstance(options, (dict, list, tuple)) and value in options:
+        return
     names = [str(o.value) if isinstance(o, enum.Enum) else str(o) for o in options]
     if value not in names:
         more = len(names) - _SHOWN_NAMES

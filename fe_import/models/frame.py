@@ -69,7 +69,7 @@ def frame_mesh(link: LinkDescription, frame: Frame, where: str) -> FrameMesh:
         place = f"{where}: frame.members[{k}]"
         chain = _subdivide(member, names, positions, place)
         members.append(range(len(elements), len(elements) + len(chain) - 1))
-        elements += [_element(link, frame, member, pair, positions, where, place) for pair in pairwise(chain)]
+        elements += _elements(link, frame, member, chain, positions, where, place)
     _check_connected(np.array([e.nodes for e in elements]), names, where)
     return FrameMesh(np.stack(positions), names, elements, members)
 
@@ -192,20 +192,20 @@ def _subdivide(member: Member, names: dict[str, int], positions: list[Array], pl
     return [*chain, last]
 
 
-def _element(
+def _elements(
     link: LinkDescription,
     frame: Frame,
     member: Member,
-    nodes: tuple[int, int],
+    chain: list[int],
     positions: list[Array],
     where: str,
     place: str,
-) -> FrameElement:
+) -> list[FrameElement]:
     choose(member.material, link.materials, f"{place}.material")
     choose(member.section, link.sections, f"{place}.section")
     material: Material = link.materials[member.material]
-    start, end = positions[nodes[0]], positions[nodes[1]]
-    along = (end - start) / np.linalg.norm(end - start)
+    places = np.stack([positions[node] for node in chain])
+    along = (places[-1] - places[0]) / np.linalg.norm(places[-1] - places[0])
     reference = np.asarray(member.local_z or ((0, 1, 0) if abs(along[2]) > 0.999 else (0, 0, 1)), dtype=float)
     usable = np.isfinite(reference).all() and reference.any()
     if not usable or np.linalg.norm(np.cross(reference, along)) < 1e-6 * np.linalg.norm(reference):
@@ -216,21 +216,27 @@ def _element(
             value=tuple(reference.tolist()),
             remedy="give a direction across the member",
         )
-    return FrameElement(
-        nodes=nodes,
-        axes=local_axes(start, end, reference),
-        length=float(np.linalg.norm(end - start)),
-        section=section_constants(
-            link.sections[member.section],
-            material.poissons_ratio,
-            frame.torsion,
-            f"{where}: sections.{member.section}",
-        ),
-        youngs_modulus=material.youngs_modulus,
-        shear_modulus=material.youngs_modulus / (2 * (1 + material.poissons_ratio)),
-        density=material.density,
-        thermal_expansion=material.thermal_expansion or 0.0,
+    section = section_constants(
+        link.sections[member.section], material.poissons_ratio, frame.torsion, f"{where}: sections.{member.section}"
     )
+    return [
+        FrameElement(
+            nodes=nodes,
+            axes=axes,
+            length=length,
+            section=section,
+            youngs_modulus=material.youngs_modulus,
+            shear_modulus=material.youngs_modulus / (2 * (1 + material.poissons_ratio)),
+            density=material.density,
+            thermal_expansion=material.thermal_expansion or 0.0,
+        )
+        for nodes, axes, length in zip(
+            pairwise(chain),
+            local_axes(places[:-1], places[1:], reference),
+            np.linalg.norm(np.diff(places, axis=0), axis=1).tolist(),
+            strict=True,
+        )
+    ]
 
 
 def _frame_interfaces(

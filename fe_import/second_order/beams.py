@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_import.elements.frame import bending_shapes
-from fe_import.model import Array, BeamLines
+from fe_import.model import Array, BeamLines, IntArray
 
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(5)
 POINTS, WEIGHTS = (_POINTS + 1) / 2, _WEIGHTS / 2
@@ -20,10 +20,10 @@ INTEGRALS = (np.append(POINTS, 1.0)[:, None] ** (_POWERS + 1) / (_POWERS + 1)) @
 
 @dataclass(frozen=True)
 class LineFields:
-    """First-order fields at the points of an element, mesh axes, in its own direction.
+    """First-order fields at the points of elements, mesh axes, in their own directions.
 
-    ``displacement`` and ``rotation`` (5, 3, m); their sources, ``curvature`` (5, 3, m) = dθ/ds and ``strain``
-    (5, 3, m) = du/ds - θ × t, stretch and shear; ``tangent`` (3,).
+    ``displacement`` and ``rotation`` (..., 5, 3, m); their sources, ``curvature`` (..., 5, 3, m) = dθ/ds and ``strain``
+    (..., 5, 3, m) = du/ds - θ × t, stretch and shear; ``tangent`` (..., 3).
     """
 
     displacement: Array
@@ -33,31 +33,35 @@ class LineFields:
     tangent: Array
 
 
-def line_fields(beams: BeamLines, element: int, ends: Array) -> LineFields:
-    """Fields of one element from its nodal components (12, m) in the mesh frame: displacement and rotation of its first
-    node, then of its second.
+def line_fields(beams: BeamLines, elements: int | IntArray, ends: Array) -> LineFields:
+    """Fields of an element, or of elements (...), from nodal components (..., 12, m) in the mesh frame: displacement
+    and rotation of the first node, then of the second.
     """
-    axes, length, count = beams.axes[element], float(beams.lengths[element]), ends.shape[1]
-    local = np.einsum("ij,kjm->kim", axes, ends.reshape(4, 3, count))
-    u, theta, curvature, strain = np.zeros((4, len(POINTS), 3, count))
-    for fields, first, second in ((u, local[0, 0], local[2, 0]), (theta, local[1, 0], local[3, 0])):
-        fields[:, 0] = np.outer(1 - POINTS, first) + np.outer(POINTS, second)
-    strain[:, 0] = (local[2, 0] - local[0, 0]) / length
-    curvature[:, 0] = (local[3, 0] - local[1, 0]) / length
-    for phi, across, about, sign in ((beams.shear[element, 0], 1, 2, 1.0), (beams.shear[element, 1], 2, 1, -1.0)):
-        nodal = np.stack([local[0, across], sign * local[1, about], local[2, across], sign * local[3, about]])
+    axes, length = beams.axes[elements], np.asarray(beams.lengths[elements])[..., None]
+    *several, _, count = ends.shape
+    local = axes[..., None, :, :] @ ends.reshape(*several, 4, 3, count)
+    u, theta, curvature, strain = np.zeros((4, *several, len(POINTS), 3, count))
+    ways = np.stack([1 - POINTS, POINTS], axis=1)
+    for fields, rates, k in ((u, strain, 0), (theta, curvature, 1)):
+        along = local[..., k::2, 0, :]  # of the first node, and of the second
+        fields[..., 0, :] = ways @ along
+        rates[..., 0, :] = ((along[..., 1, :] - along[..., 0, :]) / length)[..., None, :]
+    for plane, across, about, sign in ((0, 1, 2, 1.0), (1, 2, 1, -1.0)):
+        moved, turned = local[..., 0::2, across, :], sign * local[..., 1::2, about, :]
+        nodal = np.stack([moved[..., 0, :], turned[..., 0, :], moved[..., 1, :], turned[..., 1, :]], axis=-2)
+        phi = np.asarray(beams.shear[elements, plane])[..., None]
         deflection, slope = bending_shapes(POINTS, length, phi)
         bend, drop = _slopes(POINTS, length, phi)
-        u[:, across], turn = deflection @ nodal, slope @ nodal
-        theta[:, about], curvature[:, about] = sign * turn, sign * (bend @ nodal)
-        strain[:, across] = drop @ nodal - turn
-    back = axes.T
-    turned = [np.asarray(np.einsum("ij,pjm->pim", back, f)) for f in (u, theta, curvature, strain)]
-    return LineFields(turned[0], turned[1], turned[2], turned[3], axes[0])
+        turn = slope @ nodal
+        u[..., across, :] = deflection @ nodal
+        theta[..., about, :], curvature[..., about, :] = sign * turn, sign * (bend @ nodal)
+        strain[..., across, :] = drop @ nodal - turn
+    back = axes.swapaxes(-1, -2)[..., None, :, :]
+    return LineFields(back @ u, back @ theta, back @ curvature, back @ strain, axes[..., 0, :])
 
 
-def _slopes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
-    """Derivatives along the element of rotation and deflection of `bending_shapes`, each (points, 4)."""
+def _slopes(xi: Array, length: Array, phi: Array) -> tuple[Array, Array]:
+    """Derivatives along the elements of rotation and deflection of `bending_shapes`, each (..., points, 4)."""
     one, x2 = np.ones_like(xi), xi**2
     bend = np.stack(
         [6 / length * (2 * xi - 1), -4 + 6 * xi - phi, 6 / length * (1 - 2 * xi), 6 * xi - 2 + phi], axis=-1
@@ -72,4 +76,5 @@ def _slopes(xi: Array, length: float, phi: float) -> tuple[Array, Array]:
         ],
         axis=-1,
     )
-    return bend / ((1 + phi) * length), drop / ((1 + phi) * length)
+    whole = ((1 + phi) * length)[..., None]
+    return bend / whole, drop / whole

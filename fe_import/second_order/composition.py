@@ -14,7 +14,9 @@ from fe_import.model import Array
 
 def paired(a: Array, b: Array) -> Array:
     """(..., 3, m, k) cross products a_i × b_j of the columns of (..., 3, m) and (..., 3, k) arrays."""
-    return np.asarray(np.cross(a[..., :, None], b[..., None, :], axisa=-3, axisb=-3, axisc=-3))
+    ax, ay, az = (a[..., i, :, None] for i in range(3))
+    bx, by, bz = (b[..., i, None, :] for i in range(3))
+    return np.stack([ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx], axis=-3)
 
 
 def twice_turned(phi: Array, arm: Array) -> Array:
@@ -22,9 +24,9 @@ def twice_turned(phi: Array, arm: Array) -> Array:
 
     ½ (φ_a × (φ_b × d) + φ_b × (φ_a × d)).
     """
-    along = np.einsum("...im,...i->...m", phi, arm)
-    once = np.einsum("...ia,...b->...iab", phi, along)
-    inner = np.einsum("...ia,...ib->...ab", phi, phi)
+    along = (arm[..., None, :] @ phi)[..., None, :]
+    once = phi[..., None] * along
+    inner = phi.swapaxes(-1, -2) @ phi
     return np.asarray((once + np.swapaxes(once, -1, -2)) / 2 - arm[..., :, None, None] * inner[..., None, :, :])
 
 

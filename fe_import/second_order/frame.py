@@ -16,7 +16,9 @@ from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, BeamLines, FEModel, IntArray
 from fe_import.second_order.beams import INTEGRALS, POINTS, WEIGHTS, LineFields, line_fields
 from fe_import.second_order.composition import composed, composed_rotation, paired, twice_turned
-from fe_import.second_order.moments import Pair, of_body, of_inertia, of_masses, of_modes
+from fe_import.second_order.moments import Pair, of_body, of_inertias, of_masses, of_modes
+
+_AT_ONCE = 1_000_000  # numbers of a second-order field in memory at a time
 
 
 def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, reference: int, nodes: IntArray) -> SecondOrder:
@@ -36,7 +38,7 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
         Rising; whose fields are stored.
     """
     start = model.interface_nodes[reference].node
-    relative = relative_to(model, shapes, start)
+    phi, relative = shapes[model.dof_map[start, 3:]], relative_to(model, shapes, start)
     wanted = {int(node): k for k, node in enumerate(nodes)}
     count = shapes.shape[1]
     first, second = np.triu_indices(count - 6)
@@ -59,15 +61,19 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
 
     at = {start: (np.zeros((3, count - 6, count - 6)), np.zeros((3, count - 6, count - 6)))}
     settle(start, at[start])
-    for element, backward in _outward(beams, start):
-        near, far = beams.nodes[element][:: -1 if backward else 1]
-        ends = relative[model.dof_map[beams.nodes[element]]].reshape(12, count)
-        fields = line_fields(beams, element, ends)
-        inside, at[int(far)] = _along(fields, float(beams.lengths[element]), at[int(near)], backward)
-        settle(int(far), at[int(far)])
+    order, per_pass = _outward(beams, start), max(1, _AT_ONCE // (len(POINTS) * 3 * count**2))
+    for first_of in range(0, len(order), per_pass):
+        some = order[first_of : first_of + per_pass]
+        elements = np.array([element for element, _ in some])
+        ends = model.dof_map[beams.nodes[elements]].reshape(len(some), 12)
+        fields = line_fields(beams, elements, relative[ends])
+        inside = _along(beams, some, fields, at)
+        for element, backward in some:
+            far = int(beams.nodes[element, 0 if backward else 1])
+            settle(far, at[far])
         if not beams.lumped:
-            whole = line_fields(beams, element, shapes[model.dof_map[beams.nodes[element]]].reshape(12, count))
-            terms = _line_terms(model, beams, element, fields, inside, whole, start)
+            whole = line_fields(beams, elements, shapes[ends])
+            terms = _line_terms(model, beams, elements, fields, inside, whole, start, phi)
             momentum, spin, modal = momentum + terms[0], spin + terms[1], modal + terms[2]
     return SecondOrder(reference, momentum, spin, modal, nodes, stored[0], stored[1])
 
@@ -101,47 +107,71 @@ def _outward(beams: BeamLines, start: int) -> list[tuple[int, bool]]:
     return result
 
 
-def _along(fields: LineFields, length: float, near: Pair, backward: bool) -> tuple[Pair, Pair]:
-    """Ψ at the points of an element, (5, 3, n, n) each, and at its far end."""
+def _along(beams: BeamLines, some: list[tuple[int, bool]], fields: LineFields, at: dict[int, Pair]) -> Pair:
+    """Ψ at the points of some elements in the order of `_outward`, (e, 5, 3, n, n) each; those of their far ends are
+    added to ``at``.
+    """
     theta, kappa, gamma = (f[..., 6:] for f in (fields.rotation, fields.curvature, fields.strain))
-    tangent = np.broadcast_to(fields.tangent, (len(POINTS), 3))
+    tangent = fields.tangent[:, None]
     turning = paired(theta, kappa)
-    turning = (turning + np.swapaxes(turning, -1, -2)) / 2
-    rotation, rotation_end = _integrated(turning, length, near[1], backward)
+    rotation, far_rotation = _integrated((turning + np.swapaxes(turning, -1, -2)) / 2, beams, some, at, 1)
+    flat = rotation.reshape(*rotation.shape[:3], theta.shape[-1] ** 2)
     sheared = paired(theta, gamma)
-    slope = np.cross(rotation, fields.tangent[:, None, None], axisa=-3, axisb=0, axisc=-3)
+    slope = np.cross(flat, tangent[..., None], axisa=-2, axisb=-2, axisc=-2).reshape(rotation.shape)
     slope = slope + twice_turned(theta, tangent) + sheared + np.swapaxes(sheared, -1, -2)
-    displacement, displacement_end = _integrated(slope, length, near[0], backward)
-    return (displacement, rotation), (displacement_end, rotation_end)
+    displacement, far_displacement = _integrated(slope, beams, some, at, 0)
+    at.update((node, (far_displacement[node], turned)) for node, turned in far_rotation.items())
+    return displacement, rotation
 
 
-def _integrated(rate: Array, length: float, near: Array, backward: bool) -> tuple[Array, Array]:
-    """A field at the points and at the far end from its derivative along the element at the points."""
-    grown = length * np.einsum("pq,q...->p...", INTEGRALS, rate)
-    if backward:
-        return near + grown[:-1] - grown[-1], near - grown[-1]
-    return near + grown[:-1], near + grown[-1]
+def _integrated(
+    rate: Array, beams: BeamLines, some: list[tuple[int, bool]], at: dict[int, Pair], which: int
+) -> tuple[Array, dict[int, Array]]:
+    """A field at the points of elements, and at their far ends, from its derivative along them at the points; ``which``
+    tells its place in pairs of those ``at`` nodes before.
+    """
+    elements = [element for element, _ in some]
+    flat = rate.reshape(*rate.shape[:2], int(np.prod(rate.shape[2:])))
+    grown = (INTEGRALS @ flat).reshape(len(rate), len(INTEGRALS), *rate.shape[2:])
+    grown *= beams.lengths[elements].reshape(-1, 1, 1, 1, 1)
+    starts, found = np.empty_like(grown[:, 0]), dict[int, Array]()
+    for k, (element, backward) in enumerate(some):
+        near, far = beams.nodes[element].tolist()[:: -1 if backward else 1]
+        before = found[near] if near in found else at[near][which]
+        found[far] = before - grown[k, -1] if backward else before + grown[k, -1]
+        starts[k] = found[far] if backward else before
+    return starts[:, None] + grown[:, :-1], found
 
 
 def _line_terms(
-    model: FEModel, beams: BeamLines, element: int, fields: LineFields, inside: Pair, whole: LineFields, start: int
+    model: FEModel,
+    beams: BeamLines,
+    elements: IntArray,
+    fields: LineFields,
+    inside: Pair,
+    whole: LineFields,
+    start: int,
+    phi: Array,
 ) -> tuple[Array, Array, Array]:
-    """Momentum, spin and modal terms of the mass along an element; ``fields`` are relative to the reference."""
-    length, axes = float(beams.lengths[element]), beams.axes[element]
-    first = model.nodes[beams.nodes[element, 0]]
-    places = first + np.outer(POINTS * length, fields.tangent)
-    phi = (whole.rotation - fields.rotation)[0]
+    """Momentum, spin and modal terms of the mass along elements; ``fields`` are relative to the reference, which turns
+    by ``phi``.
+    """
+    lengths, axes = beams.lengths[elements], beams.axes[elements]
+    along = (lengths[:, None] * POINTS)[..., None] * fields.tangent[:, None]
+    places = model.nodes[beams.nodes[elements, 0], None] + along
     full = composed(inside[0], fields.displacement, phi, places - model.nodes[start])
-    masses = beams.mass[element] * length * WEIGHTS
-    momentum, spin = of_masses(masses, places, full)
-    modal = of_modes(whole.displacement[..., 6:], masses[:, None, None, None] * full)
-    if beams.rotary[element].any():
+    masses = (beams.mass[elements] * lengths)[:, None] * WEIGHTS
+    momentum, spin = of_masses(masses.ravel(), places.reshape(-1, 3), full.reshape(-1, *full.shape[2:]))
+    modal = of_modes(whole.displacement[..., 6:], masses[..., None, None, None] * full)
+    if beams.rotary[elements].any():
         turned = composed_rotation(inside[1], fields.rotation, phi)
-        inertia = axes.T @ (beams.rotary[element][:, None] * axes) * length
-        for weight, theta, field in zip(WEIGHTS, whole.rotation, turned, strict=True):
-            terms = of_inertia(weight * inertia, theta, field)
-            momentum, spin = momentum + terms[0], spin + terms[1]
-            modal = modal + of_modes(theta[:, 6:], terms[0][3:])
+        inertia = axes.swapaxes(1, 2) @ (beams.rotary[elements][..., None] * axes) * lengths[:, None, None]
+        weighted = (WEIGHTS[:, None, None] * inertia[:, None]).reshape(-1, 3, 3)
+        theta = whole.rotation
+        theta = theta.reshape(-1, *theta.shape[2:])
+        terms = of_inertias(weighted, theta, turned.reshape(-1, *turned.shape[2:]))
+        momentum, spin = momentum + terms[0], spin + terms[1]
+        modal = modal + of_modes(theta[..., 6:], terms[2])
     return momentum, spin, modal
 
 

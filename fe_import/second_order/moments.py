@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from fe_import.model import Array
-from fe_import.second_order.composition import composed, composed_rotation
+from fe_import.second_order.composition import composed, composed_rotation, paired
 
 Pair = tuple[Array, Array]  # Ψ of a displacement and of a rotation vector, (3, n, n) each
 
@@ -26,8 +26,9 @@ def of_moments(linear: Array, moment: Array) -> tuple[Array, Array]:
 
 def of_masses(masses: Array, positions: Array, field: Array) -> tuple[Array, Array]:
     """Of point masses (k,) at positions (k, 3) with a second-order displacement (k, 3, m, m)."""
-    linear = np.einsum("k,kiab->iab", masses, field)
-    return of_moments(linear, np.einsum("k,kc,kdab->cdab", masses, positions, field))
+    moments = np.concatenate([masses[None], masses * positions.T]) @ field.reshape(len(field), -1)
+    linear, *moment = moments.reshape(4, *field.shape[1:])
+    return of_moments(linear, np.stack(moment))
 
 
 def of_modes(shapes: Array, momenta: Array) -> Array:
@@ -38,29 +39,34 @@ def of_modes(shapes: Array, momenta: Array) -> Array:
 
 
 def of_inertia(inertia: Array, phi: Array, field: Array) -> tuple[Array, Array]:
-    """Of a turning inertia.
+    """Of a turning inertia; see `of_inertias`."""
+    momentum, spin, _ = of_inertias(inertia[None], phi[None], field[None])
+    return momentum, spin
+
+
+def of_inertias(inertia: Array, phi: Array, field: Array) -> tuple[Array, Array, Array]:
+    """Of all of k turning inertias, and the moment of momentum (k, 3, m, m) of each.
 
     The angular velocity in the body's own axes holds θ̇₂ - ½ φ × φ̇ and ω × θ₂ + ½ φ × (φ × ω) in second order; the
     kinetic energy of the linear modes has the terms of first order with each other.
 
     Parameters
     ----------
-    inertia : (3, 3) array
-    phi : (3, m) array
-        Rotation.
-    field : (3, m, m) array
-        Second-order rotation vector.
+    inertia : (k, 3, 3) array
+    phi : (k, 3, m) array
+        Rotations.
+    field : (k, 3, m, m) array
+        Second-order rotation vectors.
     """
-    count = phi.shape[1]
-    momentum = np.zeros((6, count, count))
-    turned = np.einsum("def,ea,fb->dab", LEVI_CIVITA, phi, phi)
-    momentum[3:] = np.einsum("cd,dab->cab", inertia, field - turned / 2)
-    once = np.einsum("ce,edf,fab->cdab", inertia, LEVI_CIVITA, field)
-    product = np.einsum("ea,db->edab", phi, phi)
-    product = (product + product.transpose(0, 1, 3, 2)) / 2
-    twice = np.einsum("ce,edab->cdab", inertia, product)
-    twice -= np.einsum("cd,ab->cdab", inertia, phi.T @ phi)
-    return momentum, once + twice
+    m = phi.shape[-1]
+    momentum = np.zeros((6, m, m))
+    own = (inertia @ (field - paired(phi, phi) / 2).reshape(len(field), 3, m * m)).reshape(field.shape)
+    momentum[3:] = own.sum(axis=0)
+    once = np.tensordot(np.tensordot(inertia, field, ([0], [0])), LEVI_CIVITA, ([1, 2], [0, 2])).transpose(0, 3, 1, 2)
+    product = np.tensordot(inertia @ phi, phi, ([0], [0])).transpose(0, 2, 1, 3)
+    twice = (product + product.transpose(0, 1, 3, 2)) / 2
+    twice -= np.tensordot(inertia, phi.swapaxes(1, 2) @ phi, ([0], [0]))
+    return momentum, once + twice, own
 
 
 def of_body(

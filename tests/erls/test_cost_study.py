@@ -17,8 +17,10 @@ import erls
 from erls.cli.main import main
 from erls.errors import Cause, SceneError, SimulationError
 from erls.report.cost_page import cost_csv, cost_page, cost_text
+from erls.scene.read import load_chain
 from erls.studies.cost import study_cost
 from erls.studies.cost_result import CostStudy, cost_summary, pareto_front, recommendation
+from erls.studies.explicit import too_stiff
 from erls.studies.grid import Grid, ladders
 from erls.studies.ladder import CostPoint, Setting, failed, overrides_of
 
@@ -132,6 +134,21 @@ def test_failures_stay_visible(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "budget" in cost_text(result)
     assert "budget" in cost_page(result)
     assert cost_summary(result)["runs"][0]["failure"]["cause"] == str(Cause.BUDGET)
+
+
+def test_explicit_methods_tell_the_step_that_they_would_need() -> None:
+    """That which keeps ω h within the limit of the method; of stiff systems only."""
+    scene = load_chain(scenes.ROOT / "data/l_shape/steel_flat.toml", ["simulation.integrator=dop853"])
+    problem = too_stiff(scene)
+    assert problem is not None
+    assert problem.cause == Cause.TOO_STIFF
+    told = re.search(r"steps of (\S+) s or less, (\d+) of them, at (\S+) Hz", str(problem))
+    assert told is not None
+    step, frequency = float(told[1]), float(told[3])
+    assert int(told[2]) == pytest.approx(scene.record.simulation.duration / step, rel=3e-3)
+    assert 2 * np.pi * frequency * step == pytest.approx(5.96, rel=3e-3)
+    for change in ("links.l.elastic_modes=2", "simulation.integrator=lobatto"):
+        assert too_stiff(load_chain(scene.path, ["simulation.integrator=dop853", change])) is None
 
 
 def test_tight_reference_of_a_rigid_pendulum(tmp_path: Path) -> None:

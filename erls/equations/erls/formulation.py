@@ -13,21 +13,25 @@ from typing import Any
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, function_in
-from erls.equations.erls.pack import pack_chain, shapes
+from erls.equations.erls.pack import pack_chain, shapes, with_numbers
 from erls.equations.erls.records import LINK_STATE, Chain, LinkState
 from erls.equations.formulation import Energy, State
-from erls.equations.serial.formulation import SerialFormulation, contiguous, residual
+from erls.equations.serial.formulation import SerialFormulation, contiguous
 from erls.equations.serial.modal_inertia import stiffened
 from erls.equations.serial.motion_series import MotionSeries
 from erls.equations.serial.node_reach import reach_of_nodes
 from erls.equations.serial.records import JOINT_STATE, JointState, Serial
 from erls.equations.serial.state_series import StateSeries, single_energy
+from erls.equations.series import places_within, residuals_leaving
 from erls.maths.records import python_reader
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
+from erls.mechanism.shared_links import differ_in_numbers
 
 _see_serial, _see_chain = python_reader(Serial), python_reader(Chain)
 _see_link, _see_joint = python_reader(LinkState), python_reader(JointState)
+
+_MOST_STARTS = 1000  # whose scales are remembered
 
 
 class Erls(SerialFormulation):
@@ -43,6 +47,20 @@ class Erls(SerialFormulation):
     def __init__(self, mechanism: Mechanism) -> None:
         super().__init__(mechanism)
         self.stiffened = stiffened(mechanism)
+        self._scales: dict[bytes, Array] = {}  # by where joints start
+
+    def share(self, other: Erls) -> None:
+        """Take over what the equations of a mechanism hold that differs in nothing but where joints start and how large
+        loads are (`erls.mechanism.shared_links.differ_in_numbers`); of others, nothing.
+        """
+        if differ_in_numbers(self.mechanism, other.mechanism):
+            self._scales = other._scales
+            vars(self)["compiled"] = with_numbers(other._packed, self.mechanism)
+
+    @cached_property
+    def _packed(self) -> CompiledSystem:
+        """The equations, which nobody uses, so that their working memory is as it was made."""
+        return pack_chain(self.mechanism)
 
     @cached_property
     def compiled(self) -> CompiledSystem:
@@ -75,21 +93,28 @@ class Erls(SerialFormulation):
     @cached_property
     def length_scales(self) -> Array:
         """(n,) largest displacement of any node per unit of each coordinate, from the initial configuration."""
+        start = np.array([joint.position for joint in self.mechanism.joints]).tobytes()
+        if (found := self._scales.get(start)) is not None:
+            return found
+        while len(self._scales) >= _MOST_STARTS:
+            self._scales.pop(next(iter(self._scales)), None)
+        return self._scales.setdefault(start, self._found_scales())
+
+    def _found_scales(self) -> Array:
         system, (y, _) = self.compiled, self.undeformed_start()
-        states = self._links(system)
-        d = np.empty((6 * self.joints, self.elastic))
-
-        def moved(v: Array) -> Array:
-            """Rates of the rigid-body modal coordinates of all links, those of ν included."""
-            residual(system, 0.0, y, v, np.zeros(0))
-            rates = [np.concatenate([state.w, state.q_rate[6:]]) for state in states]
-            return np.concatenate([shape[:6] @ rate for shape, rate in zip(self._shapes, rates, strict=True)])
-
-        rest = np.zeros(self.size)
-        still = moved(rest)  # where a prescribed motion begins with a rate
-        for i, v in enumerate(np.eye(self.size)[len(self.free_joints) :]):
-            d[:, i] = moved(v) - still
-        return np.asarray(reach_of_nodes(self.mechanism, d)[self.free])
+        rates = [view for state in self._links(system) for view in (state.w, state.q_rate[6:]) if view.size]
+        places = places_within(system.scratch, rates)
+        assert places is not None
+        v = np.vstack([np.zeros(self.size), np.eye(self.size)[len(self.free_joints) :]])
+        memory = system.reals, system.integers, system.scratch
+        left = residuals_leaving(system.residual, *memory, np.zeros(len(v)), np.tile(y, (len(v), 1)), v, places)
+        moved, first = [], 0  # rates of the rigid-body modal coordinates of all links, those of ν included
+        for shape in self._shapes:
+            moved.append(left[:, first : first + shape.shape[1]] @ shape[:6].T)
+            first += shape.shape[1]
+        d = np.hstack(moved).T
+        # the first: where a prescribed motion begins with a rate
+        return np.asarray(reach_of_nodes(self.mechanism, d[:, 1:] - d[:, :1])[self.free])
 
     def _links(self, system: CompiledSystem) -> list[LinkState]:
         """Motion of the links and the forces on them, as the last evaluation left them."""

@@ -2,27 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
 from functools import cache
+from typing import Any
 
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem, Factoring, function_in
 from erls.equations.erls import records as own
 from erls.equations.serial import pack, segments
-from erls.equations.serial.condensed import Condensed
 from erls.equations.serial.condensed import condensed as elimination_memory
 from erls.equations.serial.contacts import put_contacts
 from erls.equations.serial.decoupled_modes import MIXING, DecoupledModes, decoupled_modes
 from erls.equations.serial.ends import end_state
-from erls.equations.serial.kept import kept
-from erls.equations.serial.loads import put_loads
+from erls.equations.serial.kept import kept, kept_record
+from erls.equations.serial.loads import overwrite_loads, put_loads
 from erls.equations.serial.modal_inertia import compliance, modal_inertia, stiffened
 from erls.equations.serial.modal_inertia_kernels import Warp, warp_record, warp_state
-from erls.equations.serial.nodes import RESTING, Node, node_record, node_state
-from erls.equations.serial.records import Serial
-from erls.maths.records import Memory
+from erls.equations.serial.nodes import RESTING, laid_node, laid_node_state
+from erls.equations.serial.records import JOINT, Modes, Serial
+from erls.equations.serial.records import Joint as JointNumbers
+from erls.maths.records import Laid, Memory, laid, place_of, python_reader
 from erls.maths.se3 import inverse, pose, twist_transform
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
@@ -30,10 +31,19 @@ from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
 from erls.mechanism.loops import loop_ends
 
+_see_serial = python_reader(Serial)
 _PARALLEL = 1e-13  # sine of the angle between axes that count as one
 DENSE = 40  # coordinates up to which dense factors cost less than elimination link by link
-_bend_state, _change, _link_state = cache(own.bend_state), cache(own.change), cache(own.link_state)
-"""Of zeros, which are shared and copied where they go."""
+
+
+def _zeros(make: Callable[..., Any]) -> Callable[..., Laid]:
+    """Memory by its sizes: zeros, which are shared and copied where they go."""
+    return cache(lambda *sizes: laid(make(*sizes)))
+
+
+_bend_state, _change, _link_state = _zeros(own.bend_state), _zeros(own.change), _zeros(own.link_state)
+_warp_state, _end_state = _zeros(warp_state), _zeros(end_state)
+_RIGID_WARP, _RESTING = laid(warp_record(None)), laid(RESTING)
 _PAIRS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))  # of axes
 
 
@@ -154,13 +164,13 @@ def _curved(link: Link) -> bool:
     return link.second_order is not None and link.elastic_modes > 0
 
 
-def _seat(mechanism: Mechanism, k: int, found: Sequence[Shapes]) -> Node:
+def _seat(mechanism: Mechanism, k: int, found: Sequence[Shapes]) -> Laid:
     """The interface of its parent on which the joint of link k stands."""
     joint = mechanism.joints[k]
     if joint.seat is None:
-        return RESTING
+        return _RESTING
     link = mechanism.links[joint.parent]
-    return node_record(joint.parent, link, found[joint.parent].modes[:, 6:], joint.seat.node, _curved(link))
+    return laid_node(joint.parent, link, found[joint.parent].modes[:, 6:], joint.seat.node, _curved(link))
 
 
 def _warp(link: Link, basis: Array) -> Warp:
@@ -175,6 +185,10 @@ def _decoupled(link: Link, mass: Array) -> DecoupledModes:
     return decoupled_modes(mass, link.stiffness, link.damping)
 
 
+def _modes(link: Link, first: int, mass: Array) -> Modes:
+    return pack.modes_record(first, mass, link, kept(_decoupled, link, mass))
+
+
 def _bends(
     mechanism: Mechanism, found: Sequence[Shapes], axes: Sequence[Array], constants: Memory, scratch: Memory
 ) -> dict[str, int]:
@@ -182,10 +196,10 @@ def _bends(
     links, count, places = mechanism.links, range(len(mechanism.links)), {}
     modes = [link.elastic_modes for link in links]
     inertial = "modal_inertia" in mechanism.effects
-    bends = [kept(_bend, links[k], found[k].modes[:, 6:], axes[k], inertial) for k in count]
+    bends = [kept_record(_bend, links[k], found[k].modes[:, 6:], axes[k], inertial) for k in count]
     seats = [_seat(mechanism, k, found) for k in count]
     warps = [
-        kept(_warp, link, found[k].modes[:, 6:]) if bends[k].warped else warp_record(None)
+        kept_record(_warp, link, found[k].modes[:, 6:]) if bends[k].record.warped else _RIGID_WARP
         for k, link in enumerate(links)
     ]
     places["bends"] = constants.put_all(bends)
@@ -194,9 +208,8 @@ def _bends(
     before = [modes[parent] if parent >= 0 else 0 for parent in mechanism.parents]
     states = [_bend_state(modes[k], before[k], len(axes[k])) for k in count]
     places["bend_states"] = scratch.put_all(states)
-    seated = [node_state(seat.shapes.shape[1], len(seat.second_order) > 0) for seat in seats]
-    places["seat_states"] = scratch.put_all(seated)
-    places["warp_states"] = scratch.put_all([warp_state(modes[k] * bends[k].warped) for k in count])
+    places["seat_states"] = scratch.put_all(list(map(laid_node_state, seats)))
+    places["warp_states"] = scratch.put_all([_warp_state(modes[k] * bends[k].record.warped) for k in count])
     places["changes"] = scratch.put_all([_change(modes[k]) for k in count])
     return places
 
@@ -204,7 +217,7 @@ def _bends(
 @cache
 def _segments(
     parents: tuple[int, ...], sizes: tuple[int, ...], modes: tuple[int, ...], curved: tuple[int, ...]
-) -> tuple[list[segments.Segment], list[Condensed]]:
+) -> tuple[list[Laid], list[Laid]]:
     """Memory for elimination, by what a link moves, its elastic coordinates, and what its curvature adds to rows."""
     rooms = [
         segments.segment(
@@ -218,7 +231,25 @@ def _segments(
         )
         for k, parent in enumerate(parents)
     ]
-    return rooms, elimination_memory(rooms)
+    return list(map(laid, rooms)), list(map(laid, elimination_memory(rooms)))
+
+
+def with_numbers(system: CompiledSystem, mechanism: Mechanism) -> CompiledSystem:
+    """The same system with where the joints of another mechanism start, and its loads.
+
+    Parameters
+    ----------
+    system : CompiledSystem
+        Which `pack_chain` made, and nobody used.
+    mechanism : Mechanism
+        One that differs from that of the system in nothing else.
+    """
+    reals, integers = system.reals.copy(), system.integers.copy()
+    serial = _see_serial(reals, integers, int(integers[0]))
+    for k, joint in enumerate(mechanism.joints):
+        reals[place_of(JointNumbers, "held", integers, serial.joints + k * JOINT)] = joint.position
+    overwrite_loads(mechanism, serial, reals, integers)
+    return replace(system, reals=reals, integers=integers, scratch=system.scratch.copy())
 
 
 _UNBENT = dict.fromkeys(("bends", "seats", "warps", "bend_states", "seat_states", "warp_states", "changes"), -1)
@@ -275,7 +306,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
     chain = own.Chain(
         links=constants.put_all(
             [
-                kept(_link, links[k], found[k].modes, inertial[k], found[k].out, vectors[k], before, parent)
+                kept_record(_link, links[k], found[k].modes, inertial[k], found[k].out, vectors[k], before, parent)
                 for k, (parent, before) in enumerate(zip(parents, vectors_before, strict=True))
             ],
         ),
@@ -290,7 +321,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         complete=int(complete),
         end_count=len(ends),
         ends=constants.put_all([pack.end_record(links[k], found[k].modes, bends, end) for k, end in ends]),
-        end_states=scratch.put_all([end_state(6 + modes[k]) for k, _ in ends]),
+        end_states=scratch.put_all([_end_state(6 + modes[k]) for k, _ in ends]),
     )
     rigid, rigid_state = pack.rigid_links(mechanism, constants, scratch)
     size, own_name, kind = len(free) + sum(modes), "erls.equations.erls", "stiffened_" if bends else ""
@@ -300,7 +331,7 @@ def pack_chain(mechanism: Mechanism, dense: int = DENSE, complete: bool = False)
         joints=constants.put_all(joints),
         joint_states=pack.joint_states(scratch, count),
         modes=constants.put_all(
-            [pack.modes_record(int(firsts[k]), masses[k][6:, 6:], links[k], decoupled[k]) for k in range(count)]
+            [kept_record(_modes, links[k], int(firsts[k]), masses[k][6:, 6:]) for k in range(count)]
         ),
         **pack.addresses(mechanism, own.call_loads),
         rigid_links=rigid,

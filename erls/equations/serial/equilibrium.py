@@ -230,7 +230,7 @@ def elastic_on_diagonal(equations: TreeFormulation) -> tuple[Array, Array]:
 
 def size_of(mechanism: Mechanism) -> float:
     """Size of the largest link [m]."""
-    return max(float(np.linalg.norm(np.ptp(link.model.nodes, axis=0))) for link in mechanism.links)
+    return max(link.size for link in mechanism.links)
 
 
 class Angles:

@@ -7,6 +7,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from erls.maths.records import Laid, laid
 from erls.mechanism.links import Link
 
 T = TypeVar("T")
@@ -19,3 +20,12 @@ def kept(make: Callable[..., T], link: Link, *given: Any) -> T:
     """
     key = tuple((x.shape, x.tobytes()) if isinstance(x, np.ndarray) else x for x in given)
     return link.once((make.__qualname__, key), lambda: make(link, *given))
+
+
+def kept_record(make: Callable[..., Any], link: Link, *given: Any) -> Laid:
+    """The same of a record, as memory lays it."""
+    return kept(_laid, link, make, *given)
+
+
+def _laid(link: Link, make: Callable[..., Any], *given: Any) -> Laid:
+    return laid(make(link, *given))

@@ -13,6 +13,7 @@ another node.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
@@ -21,13 +22,12 @@ from erls.equations import compiled_system as contract
 from erls.equations.serial.nodes import (
     NODE,
     NODE_STATE,
-    Node,
     NodeState,
     centre_record,
     from_node_axes,
+    laid_node,
+    laid_node_state,
     move_node,
-    node_record,
-    node_state,
     place_node,
     read_node,
     read_node_state,
@@ -37,7 +37,7 @@ from erls.equations.serial.time_curves import curve, put_curve
 from erls.maths.calls import caller
 from erls.maths.jit import ENABLED, part
 from erls.maths.products import add_columns, clear
-from erls.maths.records import Memory, Vector, python_reader, reader, room, table_size
+from erls.maths.records import Laid, Memory, Vector, laid, place_of, python_reader, reader, room, table_size
 from erls.maths.so3 import Array
 from erls.maths.spatial import dot6, rotate, rotate_back, transform_force_back, transform_motion
 from erls.mechanism.chain import Mechanism
@@ -123,6 +123,11 @@ LOAD, LOAD_STATE = table_size(Load), table_size(LoadState)
 _see_state = python_reader(LoadState)
 
 
+@cache
+def _load_state(n: int) -> Laid:
+    return laid(room(LoadState, n=n))
+
+
 def put_loads(
     mechanism: Mechanism, bases: list[Array], bent: list[bool], constants: Memory, scratch: Memory
 ) -> dict[str, int]:
@@ -141,9 +146,9 @@ def put_loads(
     own = [*mechanism.loads, *(load for load, _, _ in sides)]
     places_of = [(-1, 0)] * len(mechanism.loads) + [(number, side) for _, number, side in sides]
 
-    def at(k: int, node: int) -> Node:
+    def at(k: int, node: int) -> Laid:
         given = k, mechanism.links[k], bases[k]
-        return centre_record(*given, bent[k]) if node == CENTRE else node_record(*given, node, bent[k])
+        return laid(centre_record(*given, bent[k])) if node == CENTRE else laid_node(*given, node, bent[k])
 
     nodes = [node for load in own for node in (at(load.link, load.node), at(*(load.axes or (load.link, load.node))))]
     records = [
@@ -154,17 +159,28 @@ def put_loads(
             factor=put_curve(constants, load.factor),
             contact=number,
             side=side,
-            wrench=load.wrench * (_mass(mechanism.links[load.link]) if load.node == CENTRE else 1.0),
+            wrench=_wrench(mechanism, load),
         )
         for load, (number, side) in zip(own, places_of, strict=True)
     ]
     tables: dict[str, tuple[Memory, list[Any]]] = {
         "load_records": (constants, records),
         "load_nodes": (constants, nodes),
-        "load_states": (scratch, [room(LoadState, n=bases[load.link].shape[1]) for load in own]),
-        "load_node_states": (scratch, [node_state(n.shapes.shape[1], len(n.second_order) > 0) for n in nodes]),
+        "load_states": (scratch, [_load_state(bases[load.link].shape[1]) for load in own]),
+        "load_node_states": (scratch, list(map(laid_node_state, nodes))),
     }
     return {"load_count": len(own), **{name: memory.put_all(every) for name, (memory, every) in tables.items()}}
+
+
+def _wrench(mechanism: Mechanism, load: PointLoad) -> Array:
+    return load.wrench * (_mass(mechanism.links[load.link]) if load.node == CENTRE else 1.0)
+
+
+def overwrite_loads(mechanism: Mechanism, serial: Serial, reals: Array, integers: IntArray) -> None:
+    """Put the wrenches of a mechanism in the place of others on the same nodes."""
+    for k, load in enumerate(mechanism.loads):
+        at = place_of(Load, "wrench", integers, serial.load_records + k * LOAD)
+        reals[at : at + 6] = _wrench(mechanism, load)
 
 
 def sides_of(contacts: Sequence[PointContact]) -> list[tuple[PointLoad, int, int]]:

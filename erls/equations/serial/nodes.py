@@ -9,14 +9,15 @@ T = 1 - a φ̃ + b φ̃² in the node's axes (A. Iserles, H. Munthe-Kaas, S. Nø
 from __future__ import annotations
 
 import math
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from erls.equations.serial.kept import kept
+from erls.equations.serial.kept import kept, kept_record
 from erls.maths.jit import part
 from erls.maths.products import add_columns, add_rows, clear
-from erls.maths.records import Matrix, Vector, reader, table_size
+from erls.maths.records import Laid, Matrix, Vector, laid, reader, table_size
 from erls.maths.so3 import Array
 from erls.maths.spatial import add_cross, dot3, invert_pose
 from erls.mechanism.links import Link, node_shape6
@@ -91,6 +92,16 @@ def node_state(e: int, bent: bool) -> NodeState:
     return NodeState(rest, rest, three, three, np.eye(3), three, six, six, rows, slope, slope, rows)
 
 
+def laid_node_state(node: Laid) -> Laid:
+    """The same, as memory lays it, for a node."""
+    return _laid_state(node.record.shapes.shape[1], len(node.record.second_order) > 0)
+
+
+@cache
+def _laid_state(e: int, bent: bool) -> Laid:
+    return laid(node_state(e, bent))
+
+
 RESTING = Node(-1, 0, np.zeros(3), np.zeros((6, 0)), np.zeros((0, 0)))
 """A node of no link, which nothing moves."""
 
@@ -110,6 +121,11 @@ def node_record(k: int, link: Link, basis: Array, node: int, bent: bool) -> Node
         Whether the link has second-order displacements.
     """
     return kept(_node_record, link, k, basis, node, bent)
+
+
+def laid_node(k: int, link: Link, basis: Array, node: int, bent: bool) -> Laid:
+    """The same, as memory lays it."""
+    return kept_record(_node_record, link, k, basis, node, bent)
 
 
 def _node_record(link: Link, k: int, basis: Array, node: int, bent: bool) -> Node:

@@ -20,7 +20,7 @@ from erls.equations.serial.records import (
 )
 from erls.equations.serial.time_curves import put_curve
 from erls.maths.calls import address_for
-from erls.maths.records import Memory
+from erls.maths.records import Memory, laid
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.curves import Curve
@@ -37,7 +37,7 @@ def step_parts(before: Array, freedom: Freedom, after: Array) -> Array:
     """(4, 12) parts of the pose before · joint · after: constant, with cosine and sine of the coordinate, and with the
     coordinate itself.
     """
-    parts = before @ freedom.parts() @ after
+    parts = before @ freedom.parts @ after
     return np.concatenate([parts[:, :3, :3].reshape(4, 9), parts[:, :3, 3]], axis=1)
 
 
@@ -119,7 +119,7 @@ def effect_flags(effects: Set[str]) -> dict[str, int]:
 def joint_states(scratch: Memory, count: int) -> int:
     """Memory for the motion of joints."""
     sizes = {"coordinate": 3, "pose": 12, "screw": 6, "twist": 6, "twist_rate": 6, "feed": 1, "forces": 2}
-    room = JointState(**{name: np.zeros(size) for name, size in sizes.items()})
+    room = laid(JointState(**{name: np.zeros(size) for name, size in sizes.items()}))
     return scratch.put_all([room] * count)
 
 

@@ -4,6 +4,7 @@ instant.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Protocol, runtime_checkable
 
@@ -51,12 +52,6 @@ class StateSeries:
         ]
 
 
-@runtime_checkable
-class _ManyAtOnce(Protocol):
-    def series(self, t: Array, y: Array, v: Array) -> StateSeries:
-        """States at times (k,) with coordinates and rates (k, n)."""
-
-
 def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> StateSeries:
     """States of a formulation at k times.
 
@@ -67,8 +62,9 @@ def state_series(formulation: Formulation, t: Array, y: Array, v: Array) -> Stat
     t : (k,) array
     y, v : (k, n) arrays
     """
-    if isinstance(formulation, _ManyAtOnce):
-        return formulation.series(t, y, v)
+    all_at_once: Callable[[Array, Array, Array], StateSeries] | None = getattr(formulation, "series", None)
+    if all_at_once is not None:
+        return all_at_once(t, y, v)
     states = [formulation.state(*at) for at in zip(t.tolist(), y, v, strict=True)]
     models = [link.model for link in formulation.mechanism.links]
     placed = any(s.nodes is not None for s in states)

@@ -24,13 +24,15 @@
     return found;
   }
 
+  const wide = (least) => (least > 0 ? { autorangeoptions: { include: [-least, least] } } : {});
+
   function layout(plot) {
     return {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", colorway: dark.matches ? DARK : LIGHT,
       font: { color: colour("text"), size: 12, family: "system-ui, sans-serif" }, margin: { l: 62, r: 12, t: 12, b: 48 },
       xaxis: { ...axis(plot.x, plot.logarithmic.includes("x")), showspikes: true, spikemode: "across", spikesnap: "cursor",
         spikethickness: 1, spikecolor: colour("soft"), spikedash: "solid" },
-      yaxis: axis(plot.y, plot.logarithmic.includes("y")), hovermode: "x unified", shapes: shapes(plot, null),
+      yaxis: { ...axis(plot.y, plot.logarithmic.includes("y")), ...wide(plot.least) }, hovermode: "x unified", shapes: shapes(plot, null),
       hoverlabel: { bgcolor: colour("paper"), font: { color: colour("text") } },
       modebar: bar(), legend: { orientation: "h", y: -0.22, x: 0 }, showlegend: plot.curves.length > 1,
     };

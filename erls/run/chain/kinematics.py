@@ -43,6 +43,11 @@ class ChainMotion(Run):
         return self.solution.failure
 
     @property
+    def start(self) -> float:
+        """First time [s]."""
+        return float(self.solution.t[0])
+
+    @property
     def end(self) -> float:
         """Last time that was computed [s]."""
         return float(self.solution.t[-1])

@@ -160,7 +160,7 @@ def _beam_row(
         raise place.error("direction", "a gauge on a beam lies along it", direction.tolist(), remedy=remedy)
     own = frame_parts(link, frame, where).mesh.elements[element]
     s, (_, y, z) = own.section, (at.axes @ offset).tolist()
-    return np.array([1 / s.area, 0.0, 0.0, 0.0, z / s.inertia_y, -y / s.inertia_z]) / own.youngs_modulus
+    return np.asarray(np.array([1 / s.area, 0.0, 0.0, 0.0, z / s.inertia_y, -y / s.inertia_z]) / own.youngs_modulus)
 
 
 def _solid_row(link: LinkDescription, solid: Solid, where: str, direction: Array | None, place: Place) -> Array:

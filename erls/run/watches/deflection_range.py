@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-import numpy as np
-
 from erls.run.chain.run import ChainRun
 from erls.run.deflection.errors import link_errors
 from erls.run.deflection.estimate import DeflectionError
@@ -50,7 +48,7 @@ def deflection_warnings(run: ChainRun, errors: Mapping[str, DeflectionError] | N
     result = []
     links = {link.name: link for link in run.formulation.mechanism.links}
     for name, found in (deflection_errors(run) if errors is None else errors).items():
-        size = float(np.linalg.norm(np.ptp(links[name].model.nodes, axis=0)))
+        size = links[name].size
         if found.error <= NOTABLE * size:
             continue
         more = "more substructures" if links[name].pieces else "substructures = 4 or more (formulation ffr)"

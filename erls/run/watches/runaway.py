@@ -37,7 +37,7 @@ class Runaway(Watch):
         self._every = 1 if begun.plan.settings.output_step is not None else _EVERY
         self._system: Formulation = solved(begun.formulation)
         self._links = self._system.mechanism.links
-        self._sizes = np.array([np.linalg.norm(np.ptp(link.model.nodes, axis=0)) for link in self._links])
+        self._sizes = np.array([link.size for link in self._links])
         self._metres = metre_scales(self._system)  # type: ignore[arg-type]
         joints = sum(not joint.drive.prescribed for joint in self._system.mechanism.joints)
         self._elastic = slice(min(joints, len(self._metres)), None)

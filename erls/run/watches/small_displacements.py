@@ -27,10 +27,6 @@ class SmallDisplacements(Watch):
         return NOTHING if ended.meaningless else Finding(range_warnings(ended.run, ended.seen))
 
 
-def _size(link: Link) -> float:
-    return float(np.linalg.norm(np.ptp(link.model.nodes, axis=0)))
-
-
 class _Reach(NamedTuple):
     """Most that a unit of each modal coordinate moves [m] and turns [rad] a node against the inboard interface, (m,)
     each.
@@ -68,7 +64,7 @@ def range_warnings(run: ChainRun, seen: StateSeries) -> list[str]:
     for k, link in enumerate(mechanism.links):
         model, q = link.model, seen.modal[k]
         second_order = link.second_order if "foreshortening" in mechanism.effects else None
-        if _within(link, q, second_order, _LARGE_DEFLECTION * _size(link)):
+        if _within(link, q, second_order, _LARGE_DEFLECTION * link.size):
             continue
         per_pass = max(1, _AT_ONCE // model.translation_shapes[..., 0].size)
         for some in np.split(q, range(per_pass, len(q), per_pass)):
@@ -82,7 +78,7 @@ def range_warnings(run: ChainRun, seen: StateSeries) -> list[str]:
                 turned[k] = np.fmax(turned[k], np.linalg.norm(rotations, axis=2).max())
     result = []
     for k, link in enumerate(mechanism.links):
-        if largest[k] > _LARGE_DEFLECTION * _size(link) or turned[k] > _LARGE_ROTATION:
+        if largest[k] > _LARGE_DEFLECTION * link.size or turned[k] > _LARGE_ROTATION:
             result.append(
                 f"link {link.name!r} moves by up to {largest[k]:.3g} m and turns by up to "
                 f"{np.degrees(turned[k]):.2g} deg against its rigid shape: beyond small displacements, expect errors "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,7 +13,6 @@ import numpy as np
 from erls.errors import Cause, SimulationError
 from erls.run.record import Run
 from erls.scene.chain import Scene
-from erls.scene.read import load_scene
 from erls.simulation.variants import Variants
 from erls.studies.sweep.quantities import quantity, values_of
 from erls.studies.sweep.store import Row
@@ -24,9 +22,7 @@ from fe_import.errors import ReportedError
 Reduction = Callable[[Run], Mapping[str, float]]
 """Numbers of a run by name, of one's own; workers import it by its name."""
 
-BENDING_EVERY = 16
-"""Of so many points the first is looked at for how far off links are that bend (`erls.run.watches.deflection_range`),
-where runs do not state their error."""
+_FEW, _OF_FEW, _OF_MANY = 256, 16, 128
 
 _known = threading.local()
 
@@ -74,7 +70,7 @@ def check_keys(task: Task, values: Sequence[Any]) -> None:
         UNKNOWN_FIELD, BAD_REFERENCE: a key misspelt.
     """
     try:
-        scene = load_scene(task.scene, [*task.overrides, *_varied(task, values)])
+        scene = Variants(task.scene, task.overrides).scene((), _varied(task, values))
         for link in scene.record.links if isinstance(scene, Scene) else ():
             if link.model and link.changes:
                 load_link(scene.folder / link.model, changes=link.changes)
@@ -88,8 +84,8 @@ def _last(key: str) -> str:
     return key.rpartition(".")[2]
 
 
-def _varied(task: Task, values: Sequence[Any]) -> list[str]:
-    return [f"{key}={json.dumps(value)}" for key, value in zip(task.keys, values, strict=True)]
+def _varied(task: Task, values: Sequence[Any]) -> list[tuple[str, Any]]:
+    return list(zip(task.keys, values, strict=True))
 
 
 def evaluate(task: Task) -> list[Row]:
@@ -97,10 +93,17 @@ def evaluate(task: Task) -> list[Row]:
     return [row_of(task, number, values, run_point(task, number, values)) for number, values in task.rows]
 
 
+def looks_at_bending(number: int) -> bool:
+    """Whether a point is looked at for how far off links are that bend (`erls.run.watches.deflection_range`), where
+    runs do not state their error: one of 16 of the first, one of 128 of the others.
+    """
+    return number % (_OF_FEW if number < _FEW else _OF_MANY) == 0
+
+
 def run_point(task: Task, number: int, values: Sequence[Any]) -> Run | ReportedError:
     """The run of a point, or its failure."""
-    bending = number % BENDING_EVERY == 0
-    return _variants(task).run(_varied(task, values), lambda t, duration: None, task.verdict, bending)
+    changes = _varied(task, values)
+    return _variants(task).run((), lambda t, duration: None, task.verdict, looks_at_bending(number), changes)
 
 
 def numbers_of(run: Run, quantities: Sequence[str] | Reduction) -> dict[str, float]:

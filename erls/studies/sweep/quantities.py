@@ -12,7 +12,7 @@ import math
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from typing import cast
 
 import numpy as np
@@ -103,6 +103,7 @@ class Quantity:
         return "m" if part == "distance" and base in run.point_names else _heads(run)[self.name][1]
 
 
+@cache
 def quantity(text: str) -> Quantity:
     """Read what is asked for.
 

@@ -23,11 +23,11 @@ from erls.scene.read import load_scene
 from erls.studies.kept import content_of
 from erls.studies.pool import each
 from erls.studies.sweep.evaluate import (
-    BENDING_EVERY,
     Reduction,
     Task,
     check_keys,
     evaluate,
+    looks_at_bending,
     numbers_of,
     row_of,
     run_point,
@@ -66,8 +66,8 @@ class Sweep:
     integration_s, wall_s : float
         Times of all integrations that were run now, and of it all [s].
     interrupted : bool
-    bending_every : int
-        Of so many points one was looked at for how far off links are that bend.
+    verdict : bool
+        Whether runs stated their error.
     """
 
     scene: Path
@@ -81,7 +81,7 @@ class Sweep:
     integration_s: float
     wall_s: float
     interrupted: bool
-    bending_every: int
+    verdict: bool
 
     @property
     def numbers(self) -> Array:
@@ -91,6 +91,11 @@ class Sweep:
             if row.numbers is not None:
                 found[row.number] = row.numbers
         return found
+
+    @property
+    def looked_at(self) -> int:
+        """Finished points of which it was looked at how far off links are that bend."""
+        return sum(self.verdict or looks_at_bending(row.number) for row in self.rows)
 
     @property
     def failed(self) -> tuple[Row, ...]:
@@ -232,7 +237,7 @@ def sweep(
         integration_s=engine.integration_s,
         wall_s=time.perf_counter() - begun,
         interrupted=interrupted,
-        bending_every=1 if verdict else BENDING_EVERY,
+        verdict=verdict,
     )
 
 
