@@ -65,7 +65,7 @@ def costs(run: Any, run_s: float, count: int, method: Any) -> str:
         tangents_s, forces_s = tangents_s + between - begun, forces_s + time.process_time() - between
     rest_s = whole_s - tangents_s - forces_s - made_s
     terms = [one.terms for one in equations.derivatives if one is not None]
-    each = sum(sum(term.apart != 0 for term in some) for some in terms)
+    each = sum(sum(term.apart != 0 for term in some) if some[0].weight else 1 for some in terms)  # 1: does not act
     each += any(term.apart == 0 for some in terms for term in some)
     passes = "a program" if equations.evaluation.taped else f"{4 * n}"
     parts = "".join(f"{part / run_s:9.2f}" for part in (tangents_s, made_s, forces_s, rest_s))

@@ -1,16 +1,18 @@
 """Shells beside published figures, closed forms, beams, solids and CalculiX: ours, the other, the difference.
 
-    python benchmarks/shells.py [--NAME ...] [--json FILE]
+    python benchmarks/shells.py [--NAME ...] [--page] [--json FILE]
 
-All tables (half an hour of one core, most of it the large displacements on fine meshes), or those that are named:
+All tables (a quarter of an hour of one core, most of it the large displacements on fine meshes), or those that are
+named. `--page` puts them into docs/shells.md as they come out, each as soon as it is there, `--json` their figures into
+a file, so that parts add up:
 
 - `--standard`, `--twisted`, `--thin`, `--large`, `--paths`, `--flight`: scenes of `data/shells/`, geometrically exact
   shells (`benchmarks/shell_figures.py`); `--patches`: constant strains on a distorted mesh, turns as rigid bodies;
 - `--links`: the shells of links, quadrangles and triangles, on the standard set and the pre-twisted cantilever with the
   drilling factors stated: ours / published on three meshes;
 - `--bracket`: the first six free frequencies of a folded bracket (0.2 and 0.15 m by 0.1 m, 5 mm of aluminium, a
-  twentieth of the width): shells of two meshes, hexahedra of 20 nodes about the same middle surface, CalculiX's S8R on
-  the mesh of the shells where `ccx` is there;
+  twentieth of the width): shells of two meshes, hexahedra of 20 nodes about the same middle surface, and where `ccx` is
+  there, CalculiX's S8R on the mesh of the shells, whose deck we read, too;
 - `--roll-up`: the three numerical models of the slides for the strip rolled up by 360 degrees, and what else the
   tangents take there; `--right-angle`: what iteration matrices take for the right-angle cantilever over 30 s;
 - `--chain`: a strip on a hinge as ERLS, FFR and nodal shells on three meshes; `--arm-stress`: stress in the bracket of
@@ -20,10 +22,14 @@ All tables (half an hour of one core, most of it the large displacements on fine
 from __future__ import annotations
 
 import argparse
+import contextlib
+import io
 import json
+import re
 import shutil
 import sys
 import tempfile
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -35,18 +41,20 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "erls"))
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "fe_import"))
 import shell_figures
 from shell_benchmarks import PUBLISHED, TWISTED, twisted
-from shell_brackets import calculix_bracket, gmsh_brackets, shell_bracket, solid_bracket
+from shell_brackets import calculix_bracket, deck_bracket, gmsh_brackets, shell_bracket, solid_bracket
 from shell_figures import Figure
 from test_shell_chains import arm, described, strip
 from test_shells import curved, patch_errors
 
 import erls
 from erls.errors import SimulationError
+from erls.files.output import replacing
 from erls.run.bodies.motion import BodyMotion
 from erls.run.bodies.rest import BodyRest, work
 from erls.view.figures import figure_of
 
 DATA = Path(__file__).parents[1] / "data"
+PAGE = Path(__file__).parents[1] / "docs/shells.md"
 MESHES = {"standard": (8, 16, 32), "twisted": ((12, 2), (24, 4), (48, 8))}
 
 
@@ -66,7 +74,7 @@ def roll_up() -> dict[str, Any]:
             run = erls.simulate(scene, verdict=False)
         except SimulationError as problem:
             found[name] = str(problem)
-            print(f"{name:<44}  {problem}", flush=True)
+            print(f"{name:<44}  {str(problem).split('; got')[0]}", flush=True)
             continue
         assert isinstance(run, BodyRest)
         took, off = work(run.statics), float(np.abs(run.position("b", 1.0)).max())
@@ -77,32 +85,38 @@ def roll_up() -> dict[str, Any]:
 
 
 def right_angle() -> dict[str, Any]:
-    """Work of iteration matrices on three steps, over 30 s, on both groups."""
+    """What iteration matrices take over 30 s, for a given step: iterations, factorizations, both as work, one of the
+    latter for the six iterations that `erls.integrate.lie_generalized_alpha` takes it for, and time of the processor.
+    """
     found: dict[str, Any] = {}
-    heads = f"{'iterations':>11}{'factored':>10}{'halved':>8}{'time [s]':>10}{'of update':>11}"
-    print(f"{'right-angle cantilever':<28}{heads}")
+    heads = ("iterations", 11), ("factored", 10), ("halved", 8), ("work", 8), ("of update", 11), ("time [s]", 10)
+    print(f"{'right-angle cantilever':<28}" + "".join(f"{x:>{n}}" for x, n in (*heads, heads[4])))
     for group in ("SE(3)", "R3xSO(3)"):
-        for step in (0.1, 0.05, 0.025):
-            first = 0.0
+        for step in (0.2, 0.1, 0.05, 0.025, 0.01, 0.0025):
+            first: tuple[float, float] | None = None
             for matrix in ("update", "auto", "frozen"):
                 name = f"{group}, {step:g} s, {matrix}"
                 changes = [f"simulation.{k}={v}" for k, v in
                            {"group": group, "step": step, "iteration_matrix": matrix}.items()]  # fmt: skip
+                scene, times = erls.load_scene(DATA / "shells/right_angle.toml", changes), []
                 try:
-                    scene = erls.load_scene(DATA / "shells/right_angle.toml", changes)
-                    runs = [erls.simulate(scene, verdict=False) for _ in range(3)]
+                    for _ in range(3):
+                        began = time.process_time()
+                        run = erls.simulate(scene, verdict=False)
+                        times.append(time.process_time() - began)
                 except SimulationError as problem:
                     found[name] = str(problem)
-                    print(f"{name:<28}  {problem}", flush=True)
+                    print(f"{name:<28}  {str(problem).split('; got')[0]}", flush=True)
                     continue
-                run = runs[-1]
                 assert isinstance(run, BodyMotion)
-                work, halved, wall = run.solution.work, run.solution.halved, min(r.wall_s for r in runs)
-                first = first or wall
+                work, halved = run.solution.work, run.solution.halved
                 own = work.newton_iterations / halved.given, work.factorizations / halved.given
-                found[name] = {"iterations": own[0], "factored": own[1], "halved": halved.steps, "wall_s": wall}
+                spent = own[0] + 6 * own[1], min(times)
+                first = first or spent
+                found[name] = {"iterations": own[0], "factored": own[1], "halved": halved.steps, "time_s": spent[1]}
                 counts = f"{own[0]:11.2f}{own[1]:10.2f}{halved.steps:8d}"
-                print(f"{name:<28}{counts}{wall:10.2f}{wall / first:11.2f}", flush=True)
+                shares = [f"{x:{width}.2f}{x / y:11.2f}" for x, y, width in zip(spent, first, (8, 10), strict=True)]
+                print(f"{name:<28}{counts}{''.join(shares)}", flush=True)
     return found
 
 
@@ -188,6 +202,7 @@ def bracket() -> dict[str, Any]:
         judges = {f"hex20, {turns}": solid_bracket(Path(folder), turns) for turns in (2, 3, 4)}
         if shutil.which("ccx"):
             judges["S8R of CalculiX"] = calculix_bracket(Path(folder), 2)
+            shells["shells, deck of S8R"] = deck_bracket(Path(folder))
         else:
             print("\nCalculiX (ccx) is not installed: no S8R")
         of_gmsh = gmsh_brackets(Path(folder))
@@ -196,9 +211,9 @@ def bracket() -> dict[str, Any]:
         found[name] = values.tolist()
         print(f"{name:<22}" + "".join(f"{v:10.2f}" for v in values))
     for name in list(judges)[2:]:
-        values = judges[name]
-        off = np.abs(shells["shells, 2"] / values - 1).max()
-        print(f"finer shells against {name}: {100 * off:.2f} % at most")
+        for own, values in list(shells.items())[1:]:
+            off = np.abs(values / judges[name] - 1).max()
+            print(f"{own} against {name}: {100 * off:.2f} % at most")
     print("the shipped bracket, meshed by gmsh, with its holes, 5 mm thick")
     for name, values in zip(("shells of gmsh", "hex20 about them"), of_gmsh, strict=True):
         found[name] = values.tolist()
@@ -245,24 +260,52 @@ TABLES: dict[str, Callable[[], dict[str, Any]]] = {
 }
 
 
+class Told(io.StringIO):
+    """What is printed is kept."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self._out = sys.stdout
+
+    def write(self, text: str, /) -> int:
+        self._out.write(text)
+        self._out.flush()
+        return super().write(text)
+
+
+def onto_page(name: str, table: str) -> None:
+    """Put a table into its block, ```text NAME, of the page."""
+    lines = "".join(f"{line.rstrip()}\n" for line in table.strip("\n").split("\n"))
+    block, page = re.compile(rf"(```text {name}\n).*?(?=```)", flags=re.DOTALL), PAGE.read_text(encoding="utf-8")
+    if not block.search(page):
+        sys.exit(f"{PAGE}: has no block ```text {name}; add it where the table is to stand")
+    with replacing(PAGE) as path:
+        path.write_text(block.sub(lambda found: found[1] + lines, page), encoding="utf-8")
+
+
+def onto_file(path: Path, name: str, found: dict[str, Any]) -> None:
+    """Put figures beside those that a file has."""
+    known = json.loads(path.read_text(encoding="utf-8")) if path.exists() else {}
+    path.write_text(json.dumps({**known, name: found}, indent=1), encoding="utf-8")
+
+
 def main() -> None:
     """Print the tables."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--json", type=Path, help="write the figures to a file, too")
+    parser.add_argument("--page", action="store_true", help="put the tables into docs/shells.md, too")
+    parser.add_argument("--json", type=Path, help="put the figures into a file, too")
     for name in TABLES:
         parser.add_argument(f"--{name}", action="store_true", help="this table")
     asked = vars(parser.parse_args())
     chosen = [name for name in TABLES if asked[name.replace("-", "_")]] or list(TABLES)
-    found = {}
     for name in chosen:
-        found[name] = TABLES[name]()
+        with contextlib.redirect_stdout(Told()) as told:
+            found = TABLES[name]()
         print(flush=True)
-    _write(asked["json"], found)
-
-
-def _write(path: Path | None, found: dict[str, Any]) -> None:
-    if path:
-        path.write_text(json.dumps(found, indent=1), encoding="utf-8")
+        if asked["page"]:
+            onto_page(name, told.getvalue())
+        if asked["json"]:
+            onto_file(asked["json"], name, found)
 
 
 if __name__ == "__main__":

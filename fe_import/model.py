@@ -201,7 +201,7 @@ class FEModel:
     left_out : dict of int
         What stands in the mesh file and is not part of the link, and how often.
     second_order_lack : str
-        Why second-order displacements of a solid cannot be computed, where they cannot.
+        Why the elements of a solid do not tell its second-order displacements, where they do not.
     materials : dict
         Those that the mesh file brings, where they are used, in its units: Young's modulus, Poisson's ratio, density.
     """

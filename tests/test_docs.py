@@ -196,6 +196,14 @@ def test_the_gallery_shows_every_scene() -> None:
     assert sum(picture.stat().st_size for picture in pictures) < 1.5e6
 
 
+def test_the_page_of_shells_holds_every_table_of_their_benchmark() -> None:
+    """As `benchmarks/shells.py --page` puts them there."""
+    text = (ROOT / "benchmarks/shells.py").read_text(encoding="utf-8").partition("TABLES: ")[2].partition("\n}\n")[0]
+    found = dict(re.findall(r"```text (\S+)\n(.*?)```", PAGES["docs/shells.md"], flags=re.DOTALL))
+    assert sorted(found) == sorted(re.findall(r'^    "([\w-]+)":', text, flags=re.MULTILINE))
+    assert all(len(table.splitlines()) > 2 for table in found.values())
+
+
 @pytest.mark.parametrize("page", PAGES)
 def test_places_and_names_exist(page: str) -> None:
     """Files, modules and functions that a page names are there."""

@@ -67,6 +67,11 @@ class Evaluation:
         loops = hasattr(system, "called") and worth_taping(asked)
         return cls(steps, kernels, kernels is not None or loops)
 
+    @property
+    def complex_steps(self) -> bool:
+        """Whether forces of complex numbers are worth their compilation: twice as dear as real ones, one by one."""
+        return self.taped and self.kernels is None
+
     def forces(self, system: CompiledSystem, knots: Knots) -> Array:
         """(k, n) forces out of balance, of equations of the same kind."""
         if self.kernels is None:

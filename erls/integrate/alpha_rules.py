@@ -14,7 +14,7 @@ from erls.maths.so3 import Array
 from erls.scene.integrators import MATRICES, STARTS
 
 MAX_HALVINGS = 12
-MAX_ITERATIONS = 10
+MAX_ITERATIONS, FROZEN_ITERATIONS = 10, 100  # a slow step with one matrix for all has no other way to go
 ROUNDING = 16 * np.finfo(float).eps
 SLOWEST_KNOWN, FASTEST_TRUSTED = 0.9, 1e-3  # bounds on a convergence rate carried over from earlier steps
 GROWTH = 1.7  # ratio of steps that is worth new factors

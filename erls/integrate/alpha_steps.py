@@ -14,6 +14,7 @@ from erls.equations.stepped import Stepped
 from erls.errors import Cause, SimulationError
 from erls.integrate.alpha_rules import (
     FASTEST_TRUSTED,
+    FROZEN_ITERATIONS,
     GROWTH,
     GUESSES,
     MAX_HALVINGS,
@@ -226,7 +227,7 @@ class Steps:
             error_limit=limit.error,
             error_factor=use.error,
             growth=GROWTH if limit.can_grow else 0.0,
-            iterations=MAX_ITERATIONS,
+            iterations=FROZEN_ITERATIONS if rules.matrix == MATRICES[alpha.FROZEN] else MAX_ITERATIONS,
             over=rules.over,
             fewest=rules.fewest,
             matrix=MATRICES.index(rules.matrix),

@@ -153,6 +153,9 @@ def truncated(model: ModalModel, elastic_modes: int) -> ModalModel:
     )
 
 
+_TURNS = np.stack([skew(e) for e in np.eye(3)])
+
+
 def payload_invariants(model: ModalModel, node: int, offset: Array, mass: float, inertia: Array) -> InertiaInvariants:
     """Invariants of a rigid body on a node.
 
@@ -169,12 +172,13 @@ def payload_invariants(model: ModalModel, node: int, offset: Array, mass: float,
     """
     translation, rotation = node_shape6(model, node)
     shape = np.vstack([translation - skew(offset) @ rotation, rotation])
-    weight = la.block_diag(mass * np.eye(3), inertia)
-    turned = [la.block_diag(skew(e), skew(e)) @ shape for e in np.eye(3)]
+    weight = np.zeros((6, 6))
+    weight[:3, :3], weight[3:, 3:] = mass * np.eye(3), inertia
+    turned = np.concatenate([_TURNS @ shape[:3], _TURNS @ shape[3:]], axis=1)  # (3, 6, m), about each axis
     return InertiaInvariants(
         m=shape.T @ weight @ shape,
-        X=np.stack([shape.T @ weight @ a for a in turned]),
-        Z=np.stack([np.stack([a.T @ weight @ b for b in turned]) for a in turned]),
+        X=shape.T @ weight @ turned,
+        Z=(turned.swapaxes(1, 2) @ weight)[:, None] @ turned,
         rigid=model.invariants.rigid,
     )
 

@@ -27,6 +27,8 @@ def build_bushings(scene: Scene, mechanism: Mechanism) -> tuple[Loop, ...]:
     SceneError
         BAD_REFERENCE, BAD_FIELD: naming file, field, value and remedy.
     """
+    if not scene.record.bushings:
+        return ()
     frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
     return tuple(
         _bushing(record, mechanism, frames, Place(scene.folder, f"{scene.path}: bushings[{k}]"))

@@ -40,6 +40,8 @@ def build_loops(scene: Scene, mechanism: Mechanism) -> tuple[Loop, ...]:
     SceneError
         BAD_REFERENCE, BAD_FIELD: naming file, field, value and remedy.
     """
+    if not scene.record.loops:
+        return ()
     frames = poses(mechanism, np.array([joint.position for joint in mechanism.joints]))
     return tuple(
         _loop(record, mechanism, frames, Place(scene.folder, f"{scene.path}: loops[{k}]"))

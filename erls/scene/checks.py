@@ -25,26 +25,21 @@ def bad(where: str, message: str, value: Any, remedy: str) -> SceneError:
 def check_tables(scene: SceneTables, file: str) -> None:
     """Every number is finite and plausible, and the scene's name a line."""
     tables = msgspec.to_builtins(scene)
-    for path, value in () if _plausible(tables) else _every_number(tables):
-        if not abs(value) <= LARGEST:
-            remedy = f"give a number between {-LARGEST:g} and {LARGEST:g}"
-            raise bad(f"{file}: {path}", "not a finite number of plausible size", value, remedy)
+    if not _plausible(tables):
+        path, value = next((path, value) for path, value in _every_number(tables) if not _plausible(value))
+        remedy = f"give a number between {-LARGEST:g} and {LARGEST:g}"
+        raise bad(f"{file}: {path}", "not a finite number of plausible size", value, remedy)
     if not scene.name.isprintable():
         raise bad(f"{file}: name", "a name is one line of printable characters", scene.name, "rename it")
 
 
-def _plausible(tables: Any) -> bool:
-    """Whether every number is, wherever it stands: nothing is said of places, which takes its time."""
-    left = [tables]
-    while left:
-        value = left.pop()
-        if isinstance(value, dict):
-            left += value.values()
-        elif isinstance(value, (list, tuple)):
-            left += value
-        elif isinstance(value, (int, float)) and not abs(value) <= LARGEST:
-            return False
-    return True
+def _plausible(value: Any) -> bool:
+    """Of all numbers of nested tables and lists: their places, which take longer, are looked for where one is not."""
+    if isinstance(value, dict):
+        return all(map(_plausible, value.values()))
+    if isinstance(value, (list, tuple)):
+        return all(map(_plausible, value))
+    return not isinstance(value, (int, float)) or abs(value) <= LARGEST
 
 
 def _every_number(value: Any, path: str = "") -> Iterable[tuple[str, float]]:

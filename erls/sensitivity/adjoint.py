@@ -15,7 +15,7 @@ import numpy as np
 
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
-from erls.sensitivity.equations import Equations, Stretch, solve
+from erls.sensitivity.equations import Equations, Stretch, Walk, solve
 from erls.sensitivity.schemes import Scheme
 from erls.sensitivity.start import start_derivatives
 from erls.sensitivity.variants import Difference
@@ -42,12 +42,7 @@ def gradients(run: ChainRun, differences: Sequence[Difference], scheme: Scheme, 
     equations = Equations(run, differences, scheme)
     state = np.zeros((4, n, count))  # by y, v, a and α
     for walk in reversed(equations.walks):
-        for first, end in reversed(equations.stretches(walk)):
-            stretch = equations.stretch(walk, first, end)
-            multipliers = np.empty((end - first, n, count))
-            state = _steps_back(stretch, _within(seeds, first, end), state, multipliers)
-            for k, force in equations.each_force(stretch.knots):
-                total[k] += np.tensordot(force, multipliers, 2)
+        state = stepped_back(equations, walk, (walk.first + 1, walk.end), seeds, state, total)
         knots = equations.knots(walk, np.array([walk.first]))
         mass, damping, stiffness = (x[0] for x in equations.tangents(knots))
         y, v, a, algorithmic = state
@@ -59,6 +54,21 @@ def gradients(run: ChainRun, differences: Sequence[Difference], scheme: Scheme, 
         state = np.stack([y + stiffness.T @ found, v + damping.T @ found, 0 * y, 0 * y])
     start = start_derivatives(run, differences)
     return np.asarray(total + np.tensordot(start, state[:2], ((0, 1), (0, 1))))
+
+
+def stepped_back(
+    equations: Equations, walk: Walk, between: tuple[int, int], seeds: Seeds, state: Array, total: Array
+) -> Array:
+    """Derivatives by (4, n, c) at the start of some steps of a leg from those at their end; what parameters do between
+    is added to ``total`` (p, c).
+    """
+    for first, end in reversed(equations.stretches(walk, between)):
+        stretch = equations.stretch(walk, first, end)
+        multipliers = np.empty((end - first, *state.shape[1:]))
+        state = _steps_back(stretch, _within(seeds, first, end), state, multipliers)
+        for k, force in equations.each_force(stretch.knots):
+            total[k] += np.tensordot(force, multipliers, 2)
+    return state
 
 
 def _within(seeds: Seeds, first: int, end: int) -> dict[int, Array]:

@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from scipy.linalg import lapack
 
-from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
+from erls.equations.serial.equilibrium import elastic_on_diagonal
 from erls.equations.system import metre_scales
 from erls.equations.tangents import Evaluation, Knots, Tangents, steps_of
 from erls.errors import Cause, SimulationError
@@ -30,7 +30,7 @@ from erls.sensitivity.schemes import Scheme
 from erls.sensitivity.variants import Difference
 from fe_import.model import IntArray
 
-_ROOM = 4_000_000
+_ROOM = 2_000_000
 """Numbers of tangents that are held at a time."""
 
 _SAMPLE = 64  # knots at which forces show how they depend on a parameter
@@ -182,8 +182,7 @@ class Equations:
         system: Any = run.formulation
         tree: Any = getattr(system, "bare", system)  # under the loops
         stiffness, _ = elastic_on_diagonal(tree)
-        size = size_of(system.mechanism) or float(system.mechanism.reach)  # of a point that slides
-        steps = steps_of(metre_scales(system), size, stiffness)
+        steps = steps_of(metre_scales(system), float(system.mechanism.reach), stiffness)
         self.system = system if moving is None else moving
         self.evaluation = Evaluation.of(self.system.compiled, steps, len(run.solution.t))
         sample = self._sample()

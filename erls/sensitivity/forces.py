@@ -3,23 +3,28 @@
 ∂R/∂p is a sum of forces R of equations at other values of p, or with constants c + Δp dc/dp, of which R is a simpler
 function: linear in inertia, in loads, in gains. Fewer terms than fourth order takes are enough then, as a look at some
 knots shows: two on either side, or one beside the run itself.
+
+Forces of loops are what is left of much larger ones, and bend within steps that rounding asks for. In long runs of them
+derivatives along constants are complex steps, which have no size (W. Squire, G. Trapp, SIAM Rev. 40 (1998) 110-112).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from erls.equations.compiled_system import CompiledSystem
 from erls.equations.tangents import Evaluation, Knots
+from erls.maths.jit import any_scalar
 from erls.maths.so3 import Array
 from erls.sensitivity.variants import Difference, Variant
 from fe_import.derivatives import STENCILS, STEP
 
 _LINEAR = 1e-10  # of a derivative: what the third order of steps makes of it; a square root makes 1e-7
 _ROUNDING = 4e-15  # of forces out of balance, and of constants
+_COMPLEX = 1e-30  # step
 _SEEN = 1e3  # times rounding: less is nothing
 
 
@@ -51,6 +56,42 @@ class Term(NamedTuple):
         return np.asarray(evaluation.forces(self.system, turned) @ self.turn)
 
 
+class ComplexForces:
+    """Forces out of balance of complex numbers, compiled when they are first asked for.
+
+    Parameters
+    ----------
+    system : CompiledSystem
+    slope : (r,) array, optional
+        Derivative of its constants.
+    """
+
+    def __init__(self, system: CompiledSystem, slope: Array | float = 0.0) -> None:
+        self._residual: Any = any_scalar(system.residual, getattr(system, "called", None))
+        self._reals, self._scratch = system.reals + 1j * _COMPLEX * slope, system.scratch.astype(complex)
+        self._integers = system.integers
+
+    def slope(self, t: float, y: Array, v: Array, a: Array, moved: Array | float = 0.0) -> Array:
+        """(n,) derivative of forces along that of constants, and along changes (2, n) of coordinates and rates."""
+        moved = np.broadcast_to(moved, (2, len(y)))
+        y, v = (x + 1j * _COMPLEX * change for x, change in zip((y, v), moved, strict=True))
+        out = np.empty(len(y), dtype=complex)
+        self._residual(self._reals, self._integers, self._scratch, t, y, v, a.astype(complex), out)
+        return np.asarray(out.imag / _COMPLEX)
+
+
+@dataclass(frozen=True)
+class ExactDerivative:
+    """∂R/∂p by complex steps along constants."""
+
+    forces: ComplexForces
+    terms: tuple[Term, ...] = ()
+
+    def at(self, knots: Knots, evaluation: Evaluation, known: dict[int, Array]) -> Array:
+        """As of `ForceDerivative`."""
+        return np.array([self.forces.slope(*knot) for knot in zip(*knots, strict=True)]).reshape(knots.y.shape)
+
+
 @dataclass(frozen=True)
 class ForceDerivative:
     """∂R/∂p as a sum of terms."""
@@ -78,7 +119,7 @@ class ForceDerivative:
 
 def force_derivative(
     base: CompiledSystem, difference: Difference, sample: Knots, evaluation: Evaluation
-) -> ForceDerivative | None:
+) -> ForceDerivative | ExactDerivative | None:
     """By a parameter, with as few terms as some knots let it have; None where forces do not depend on it.
 
     Parameters
@@ -97,14 +138,18 @@ def force_derivative(
     else:
         terms = _along(line, base, STEP * difference.parameter.size)
     here = Term(0.0, 0.0, base)
-    found = [term.forces(sample, evaluation) for term in terms]
+    own, found = here.forces(sample, evaluation), [term.forces(sample, evaluation) for term in terms]
+    if all(np.array_equal(one, own) for one in found):  # a spring at a joint that follows a motion, say
+        return ForceDerivative((here, *terms))
     rounding = _ROUNDING * max(map(_largest, found)) / min(abs(term.apart) for term in terms if term.apart)
     inner, whole, curved = _inner(terms, found, rounding)
     if line is not None and whole and (inner is None or rounding > _LINEAR * whole):
+        if evaluation.complex_steps:
+            return ExactDerivative(ComplexForces(replace(line.system, reals=base.reals), line.slope))
         off = max(curved, rounding)
         share = (rounding * whole / off**2 / 4) ** 0.2  # the least of (off/whole)² s⁴ + (rounding/whole) / s
         return ForceDerivative(tuple(_along(line, base, share * STEP * difference.parameter.size)))
-    linear = _linear([here, *terms], [here.forces(sample, evaluation), *found], rounding)
+    linear = _linear([here, *terms], [own, *found], rounding)
     return ForceDerivative(linear or inner or tuple(terms))
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 
 from erls.equations.linearization import WIDE, difference_steps, slopes
 from erls.equations.registry import system_of
-from erls.equations.serial.equilibrium import elastic_on_diagonal, size_of
+from erls.equations.serial.equilibrium import elastic_on_diagonal
 from erls.equations.system import metre_scales
 from erls.errors import Cause, SceneError
 from erls.integrate.base import hermite, knots_after
@@ -230,7 +230,7 @@ def _steps(run: ChainRun) -> Array:
         return np.asarray(np.where(metres > 0, reach / np.where(metres > 0, metres, 1.0), WIDE * largest))
     tree: Any = getattr(formulation, "bare", formulation)  # under the loops
     stiffness, _ = elastic_on_diagonal(tree)
-    return difference_steps(metre_scales(formulation), size_of(formulation.mechanism), stiffness, WIDE)
+    return difference_steps(metre_scales(formulation), float(formulation.mechanism.reach), stiffness, WIDE)
 
 
 def _weights(ends: Array, t: float) -> Array:

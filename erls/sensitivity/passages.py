@@ -12,7 +12,6 @@ by steps that are as small as the derivatives need them (E. Hairer, S. P. Nørse
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 
@@ -21,16 +20,15 @@ from erls.equations.system import metre_scales
 from erls.equations.tangents import Knots
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Leg
-from erls.maths.jit import any_scalar
 from erls.maths.so3 import Array
 from erls.sensitivity.equations import Equations
+from erls.sensitivity.forces import ComplexForces
 from fe_import.model import IntArray
 
 _SMALL, _SLOW = 1e-7, 1e-7
 """Steps of differences along a derivative, of the size of the mechanism, and [m/s]."""
-_STEP = 1e-30  # of complex steps
 _RTOL, _ATOL = 1e-11, 1e-12  # within a contact rates change by a thousand times what is left of their derivatives
-_MOST = 200_000  # evaluations of all accelerations
+_MOST = 50_000  # states of one passage, whose accelerations and derivatives are found: a minute
 
 
 class Passage:
@@ -53,15 +51,14 @@ class Passage:
     def __init__(
         self, equations: Equations, bare: CompiledSystem, held: Callable[[], IntArray], reach: float
     ) -> None:
-        self._equations, self._bare, self._held, self._reach = equations, bare, held, reach
+        self._equations, self._held, self._reach = equations, held, reach
         self._system = equations.system
         self._metres = metre_scales(self._system)
-        self._residual: Any = any_scalar(bare.residual, getattr(bare, "called", None))
-        self._reals, self._scratch = bare.reals.astype(complex), bare.scratch.astype(complex)
+        self._forces = ComplexForces(bare)
         self._made = 0
 
     def over(self, times: Array, leg: Leg, y: Array, v: Array, changes: Array) -> Array:
-        """(k, 3, n, p) derivatives of coordinates, rates and accelerations at times (k,), from (2, n, p) at a state.
+        """(k, 3, n, c) derivatives of coordinates, rates and accelerations at times (k,), from (2, n, c) at a state.
 
         Parameters
         ----------
@@ -71,7 +68,8 @@ class Passage:
             Between whose first and last time forces are asked for.
         y, v : (n,) arrays
             The state.
-        changes : (2, n, p) array
+        changes : (2, n, c) array
+            The last p of them by the p parameters; those before are what becomes of changes of the state alone.
 
         Raises
         ------
@@ -101,7 +99,7 @@ class Passage:
         while known < len(found):
             told = solver.step()
             if solver.status == "failed" or self._made > _MOST:
-                raise _too_long(solver.t, told or f"{self._made} evaluations")
+                raise _too_long(solver.t, told or f"{self._made} states")
             within = solver.dense_output()
             while known < len(found) and times[known + 1] <= solver.t:
                 t = float(times[known + 1])
@@ -120,17 +118,47 @@ class Passage:
             return np.full_like(z, np.nan)
         return np.concatenate([v, a, changes[1].ravel(), self.gains(t, y, v, a, changes).ravel()])
 
+    def transition(self, times: Array, leg: Leg, y: Array, v: Array) -> Array:
+        """(k, 3, n, 2n + p) derivatives at times (k,) by the coordinates and rates (n,) of a state, and by parameters.
+
+        Parameters
+        ----------
+        times, leg, y, v
+            As of `over`.
+        """
+        n, count = len(y), len(self._equations.derivatives)
+        units = np.concatenate([np.eye(2 * n), np.zeros((2 * n, count))], axis=1)
+        return self.over(times, leg, y, v, units.reshape(2, n, -1))
+
     def gains(self, t: float, y: Array, v: Array, a: Array, changes: Array) -> Array:
-        """(n, p) derivatives of the accelerations (n,) of a state, from (2, n, p) of the state."""
-        self._made += changes.shape[2]
-        right = self._equations.forces(Knots(np.array([t]), y[None], v[None], a[None]))[0]
-        out, still = np.empty(len(y), dtype=complex), a.astype(complex)
-        for k in range(changes.shape[2]):
-            moved = (x + 1j * _STEP * changes[i, :, k] for i, x in enumerate((y, v)))
-            self._residual(self._reals, self._bare.integers, self._scratch, t, *moved, still, out)
-            right[:, k] += out.imag / _STEP
+        """(n, c) derivatives of the accelerations (n,) of a state, from (2, n, c) of the state, as of `over`."""
+        n, columns = changes.shape[1:]
+        self._made += 1
+        right = self.forces(t, y, v, a)
+        right = np.concatenate([np.zeros((n, columns - right.shape[1])), right], axis=1)
+        if columns > 2 * n:
+            right += self.tangents(t, y, v, a) @ changes.reshape(2 * n, columns)
+        else:
+            right += np.stack([self._forces.slope(t, y, v, a, changes[:, :, k]) for k in range(columns)], axis=1)
         right[self._held()] = 0.0
         return np.asarray(-np.linalg.solve(self._system.mass_matrix(t, y), right))
+
+    def forces(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n, p) ∂R/∂p of a state."""
+        return np.asarray(self._equations.forces(Knots(np.array([t]), y[None], v[None], a[None]))[0])
+
+    def tangents(self, t: float, y: Array, v: Array, a: Array) -> Array:
+        """(n, 2n) ∂R/∂(y, v) of a state."""
+        n = len(y)
+        return np.stack([self._forces.slope(t, y, v, a, unit.reshape(2, n)) for unit in np.eye(2 * n)], axis=1)
+
+    def gains_back(self, t: float, y: Array, v: Array, a: Array, asked: Array) -> tuple[Array, Array]:
+        """The transpose of `gains`: from derivatives (n, c) by accelerations, (2, n, c) by the state, (p, c) by
+        parameters.
+        """
+        found = -np.linalg.solve(self._system.mass_matrix(t, y).T, asked)
+        found[self._held()] = 0.0
+        return (self.tangents(t, y, v, a).T @ found).reshape(2, len(y), -1), self.forces(t, y, v, a).T @ found
 
     def share(self, change: Array) -> float:
         """Step along a change (2, n) of a state for differences; 0 where there is none."""
@@ -144,6 +172,6 @@ def _too_long(t: float, told: str) -> SimulationError:
         Cause.BUDGET,
         f"derivatives through a contact take too many steps: {told}",
         where=f"t = {t:.9g} s",
-        limit=f"{_MOST} evaluations in one contact",
+        limit=f"{_MOST} states in one contact",
         remedy="end the run before contacts that last, or make links rigid whose vibrations are quick",
     )

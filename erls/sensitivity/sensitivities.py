@@ -200,11 +200,6 @@ def _askings(
     if method == "forward":
         return None
     chosen = method == "adjoint"
-    if _eventful(run):
-        if chosen:
-            what = "runs with contacts, stops or joints that stick by the adjoint method"
-            raise _refusal(what, "method", "take 'auto' or 'forward'")
-        return None
     sizes = [len(sums[name]) if name in sums else value.size for name, value in values.items()]
     few = sum(sizes) < parameters and parameters > _FEW
     if not chosen and not few:
@@ -261,6 +256,10 @@ def _adjoint(
         from erls.sensitivity import nodal_adjoint  # here: most runs need none of it
 
         through = nodal_adjoint.gradients(run, found, seeds, ends[-1])
+    elif _eventful(run):
+        from erls.sensitivity import eventful  # here: most runs need none of it
+
+        through = eventful.gradients(run, found, scheme_of(run), seeds, ends[-1])
     else:
         through = gradients(run, found, scheme_of(run), seeds, ends[-1])
     for one, row in zip(found, through, strict=True):

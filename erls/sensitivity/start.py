@@ -44,7 +44,7 @@ def _static(run: ChainRun, differences: Sequence[Difference]) -> Array:
     _, rows = held.conditions(y)
     multipliers = -np.linalg.lstsq(rows.T, held.forces(y[None], np.zeros(held.loops))[0], rcond=None)[0]
     loops = multipliers[: held.loops]
-    steps = difference_steps(held.metres, held.size, held.stiffness)
+    steps = difference_steps(held.metres, float(base.mechanism.reach), held.stiffness)
     slope = derivatives(lambda many: held.forces(many, loops), y, steps)
     block = np.block([[slope, rows.T], [rows, np.zeros((len(rows),) * 2)]])
 

@@ -52,6 +52,41 @@ class Piece(NamedTuple):
     switched: bool
 
 
+class Switch(NamedTuple):
+    """What a switch makes of small changes of a state: δẏ⁺ = δẏ⁻ - (a⁻ - a⁺) δg / ġ.
+
+    Attributes
+    ----------
+    jump : (n,) array
+        (a⁻ - a⁺) / ġ.
+    slope : (2, n) array
+        ∂g/∂(y, ẏ).
+    own : (p,) array
+        ∂g/∂p.
+    stuck : (h,) array of int
+        Coordinates that stick from then on.
+    """
+
+    jump: Array
+    slope: Array
+    own: Array
+    stuck: IntArray
+
+    def through(self, state: Array) -> Array:
+        """(2, n, p) right after it, from those before."""
+        result = state.copy()
+        result[1] -= np.outer(self.jump, self.own + np.tensordot(self.slope, state, 2))
+        result[1, self.stuck] = 0.0
+        return result
+
+    def back(self, state: Array) -> tuple[Array, Array]:
+        """(2, n, c) derivatives of outputs by the state before, and (p, c) by parameters, from those by it after."""
+        result = state.copy()
+        result[1, self.stuck] = 0.0
+        later = -self.jump @ result[1]
+        return result + np.multiply.outer(self.slope, later), np.outer(self.own, later)
+
+
 class StuckDifference(Difference):
     """The same derivative of equations with modes."""
 
@@ -130,16 +165,10 @@ class Modes:
             found.append(Piece(first, end, leg, modes, switched))
         return found
 
-    def through(
-        self,
-        run: ChainRun,
-        piece: Piece,
-        after: Piece,
-        state: Array,
-        passage: Passage,
-        differences: Sequence[Difference],
-    ) -> Array:
-        """(2, n, p) derivatives right after a switch, from those before it.
+    def switch(
+        self, run: ChainRun, piece: Piece, after: Piece, passage: Passage, differences: Sequence[Difference]
+    ) -> Switch:
+        """That at the end of a piece, whose modes are set.
 
         Raises
         ------
@@ -172,18 +201,16 @@ class Modes:
                 where=f"joint {name}: friction",
                 remedy="end the run before, or change what makes it do so only just",
             )
-        result = state.copy()
-        for k, difference in enumerate(differences):
-            change = difference.of(
-                lambda one: np.array(left(one.formulation, t, one.placed(y), one.placed(v)))
-            )
-            share, (place, rate) = passage.share(state[..., k]), state[..., k]
-            if share:
-                moved = [left(self.sticking, t, y + x * place, v + x * rate) for x in (share, -share)]
-                change = change + (moved[0] - moved[1]) / (2 * share)
-            result[1, :, k] -= (before - later) * (float(change) / falling)
-        result[1, self.sticking.rubbing.places[after.modes == 0.0]] = 0.0
-        return result
+        own = [
+            float(one.of(lambda x: np.array(left(x.formulation, t, x.placed(y), x.placed(v))))) for one in differences
+        ]
+        slope = np.zeros(2 * len(y))
+        for k, unit in enumerate(np.eye(2 * len(y)).reshape(-1, 2, len(y))):
+            step = passage.share(unit)
+            above, below = (left(self.sticking, t, y + x * unit[0], v + x * unit[1]) for x in (step, -step))
+            slope[k] = (above - below) / (2 * step) if step else 0.0
+        stuck = self.sticking.rubbing.places[after.modes == 0.0]
+        return Switch((before - later) / falling, slope.reshape(2, -1), np.array(own), stuck)
 
     def _joint(self, t: float, y: Array, v: Array, a: Array, piece: Piece, after: Piece) -> int:
         """Number of the joint that switches."""

@@ -28,6 +28,8 @@ from erls.simulation.chains import models_of
 from fe_import.derivatives import STENCILS, STEP, Stencil, held
 from fe_import.errors import ReportedError
 
+_PLACED = "mesh_pose"  # where a link stands on its joint, of which its model knows nothing
+
 
 @dataclass(frozen=True)
 class Variant:
@@ -235,7 +237,7 @@ def _mechanism(run: ChainRun, parameter: Parameter, value: float) -> Mechanism:
         described = description_with(scene, parameter, value)
     else:
         scene = scene_with(scene, parameter, value)
-    if k is not None:
+    if k is not None and parameter.key.split(".")[2] != _PLACED:
         models[k] = link_model(scene, k, lambda text: None, described)
         if described is not None and descriptions[k] is not None:  # made of beams, as nodes take them
             descriptions[k] = described.description

@@ -128,16 +128,19 @@ def thick(positions: Array, triangles: IntArray, heights: Array, values: Array) 
     -------
     (3 n, 3), (r, 3), (3 n,) arrays
     """
-    a, b, c = (positions[triangles[:, k]] for k in range(3))
-    normals = np.cross(b - a, c - a)
-    each = normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    corners = positions[triangles]
+    ahead, back = (np.roll(corners, k, axis=1) - corners for k in (-1, 1))
+    normals = np.cross(ahead, back)
+    sizes = np.linalg.norm(normals, axis=-1, keepdims=True)
+    each = normals[:, 0] / np.maximum(sizes[:, 0], 1e-300)
+    angles = np.arctan2(sizes[..., 0], (ahead * back).sum(axis=-1))  # both sides of a fold weigh the same, however cut
     mean = np.zeros_like(positions)
-    np.add.at(mean, triangles, normals[:, None])
+    np.add.at(mean, triangles, angles[..., None] * each[:, None])
     mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
     slant, met = np.zeros(len(positions)), np.zeros(len(positions))
-    np.add.at(slant, triangles, np.einsum("tc,tkc->tk", each, mean[triangles]))
-    np.add.at(met, triangles, 1.0)
-    mean /= np.clip(slant / np.maximum(met, 1.0), 0.3, 1.0)[:, None]
+    np.add.at(slant, triangles, angles * np.einsum("tc,tkc->tk", each, mean[triangles]))
+    np.add.at(met, triangles, angles)
+    mean /= np.clip(slant / np.maximum(met, 1e-300), 0.3, 1.0)[:, None]
     count = len(positions)
     places = np.concatenate([positions, *(positions + heights[:, k, None] * mean for k in (1, 0))])
     edges = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)

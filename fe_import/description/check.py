@@ -92,6 +92,11 @@ def check_link(link: LinkDescription, file: str) -> None:
     if link.solid is not None and not 0 < link.solid.mesh_error < math.inf:
         message, remedy = "an error must be positive", "give a share, as 0.05 for 5 percent"
         raise _fail(f"{file}: solid.mesh_error", message, link.solid.mesh_error, remedy)
+    if link.solid is not None and link.solid.size is not None and not 0 < link.solid.size < math.inf:
+        raise _fail(f"{file}: solid.size", "a size must be positive", link.solid.size, "give a length")
+    for name, at in link.solid.faces.items() if link.solid is not None else ():
+        if not name or "\0" in name or not all(map(math.isfinite, at)):
+            raise _fail(f"{file}: solid.faces.{name}", "a face has a name and a finite position", at, "give both")
     for k, stretch in enumerate(link.solid.stretch if link.solid is not None else ()):
         _check_stretch(stretch, f"{file}: solid.stretch[{k}]")
     if link.shell is not None:

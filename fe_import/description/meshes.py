@@ -52,8 +52,14 @@ class Solid(Record, frozen=True):
     Attributes
     ----------
     mesh : str
-        An input deck, bulk data, or any file that meshio reads, also packed as ``.gz``; the path starts at the
+        An input deck, bulk data, or any file that meshio reads, also packed as ``.gz``; or a geometry (STEP, IGES,
+        BREP), which gmsh meshes with tetrahedra of 10 nodes (``pip install 'erls[geometry]'``). The path starts at the
         description.
+    size : float, optional
+        Of the elements of a geometry [m]; needed for one, and for nothing else. About the least thickness will do.
+    faces : dict of (3,) floats
+        Names for the surfaces of a geometry next to these positions [m], for interfaces: a point on one, or the centre
+        of a bore, which is both its halves. Without a name they are ``surface:N``, by their number in gmsh.
     material : str
         A name from ``[materials]``, for the whole mesh; without it and ``regions`` an input deck brings its materials.
     regions : list of Region
@@ -74,6 +80,8 @@ class Solid(Record, frozen=True):
     """
 
     mesh: str
+    size: float | None = None
+    faces: dict[str, Vector] = {}
     material: str = ""
     regions: list[Region] = []
     nodes: dict[str, Vector] = {}
@@ -135,7 +143,8 @@ class Shell(Record, frozen=True):
     Attributes
     ----------
     mesh : str
-        As in ``[solid]``; every triangle and quadrangle of it is a shell. Left out beside ``[solid]``.
+        As in ``[solid]``; every triangle and quadrangle of it is a shell, of second order four. Left out beside
+        ``[solid]``.
     material : str
         A name from ``[materials]``, for the whole mesh.
     thickness : float, optional

@@ -131,6 +131,7 @@ def check_basis(
             max(least, min(_MARGIN * rounding, _LOOSE)),
         ),
     ]
+    _refuse([(checks[0], _TOO_SLENDER)], where)  # what follows may not have a solution then
     spent = _spent(model, rounding)
     if len(omega) > 6:
         frequency, departure = rigid_motion_as_eigenmodes(mass, stiffness, basis.rigid, float(omega[6]))
@@ -146,7 +147,7 @@ def check_basis(
         "look for loose parts, hinges, supports, matrices of another model, and for many small elements in a slender "
         "or very stiff part"
     )
-    _refuse(((check, _TOO_SLENDER if check.name.startswith(ROUNDING) else remedy) for check in checks), where)
+    _refuse(((check, remedy) for check in checks), where)
     return (*checks, *_missing_modes(model, omega), HealthCheck("condition of the basis", _condition(mass), NO_LIMIT))
 
 

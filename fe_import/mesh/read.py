@@ -21,6 +21,8 @@ from fe_import.elements.solid_mesh import ElementBlock, ShellCells, SolidMesh
 from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import as_spelt, choose
 from fe_import.mesh.checks import check_mesh, scaled_jacobians
+from fe_import.mesh.first_order import of_first_order
+from fe_import.mesh.geometry_files import Meshing, is_geometry, read_geometry
 from fe_import.mesh.guard import unpacked
 from fe_import.mesh.raw import RawMesh
 from fe_import.model import IntArray
@@ -56,8 +58,10 @@ class Wanted:
     shell_sets: tuple[str, ...] = ()
 
 
-def read_mesh(path: Path, ignore: Sequence[str] = (), wanted: Wanted = Wanted()) -> SolidMesh:
-    """Read and check a mesh file, or a ``.gz`` of one; its format follows from the suffix.
+def read_mesh(
+    path: Path, ignore: Sequence[str] = (), wanted: Wanted = Wanted(), meshing: Meshing | None = None
+) -> SolidMesh:
+    """Read and check a mesh file, or a ``.gz`` of one; its format follows from the suffix. Geometries are meshed.
 
     Named cell sets (gmsh's physical groups, Abaqus' element sets, families of MED) of solid elements become element
     sets; named cell sets of faces, lines or points, surfaces and named point sets become node sets. Numbers per cell
@@ -70,6 +74,8 @@ def read_mesh(path: Path, ignore: Sequence[str] = (), wanted: Wanted = Wanted())
     ignore : sequence of str
         Keywords, cards and types of elements of the file that the link is to be without.
     wanted : Wanted
+    meshing : Meshing, optional
+        How a geometry is meshed.
 
     Returns
     -------
@@ -86,7 +92,9 @@ def read_mesh(path: Path, ignore: Sequence[str] = (), wanted: Wanted = Wanted())
     """
     if not path.exists():
         raise FEImportError(Cause.FILE_NOT_FOUND, "no such mesh file", where=str(path), remedy="check the path")
-    raw = _read(path)
+    raw = _read(path, meshing)
+    if wanted.shells and not wanted.solids:  # beside solids they share all nodes with these
+        raw = of_first_order(raw)
     left_out = _left_out(raw, ignore, str(path), wanted)
     solids = _solid_blocks(raw, str(path)) if wanted.solids else []
     if not wanted.solids:
@@ -121,12 +129,14 @@ def read_mesh(path: Path, ignore: Sequence[str] = (), wanted: Wanted = Wanted())
     return mesh
 
 
-def _read(path: Path) -> RawMesh:
+def _read(path: Path, meshing: Meshing | None) -> RawMesh:
     if not path.is_file():
         raise FEImportError(
             Cause.NOT_READABLE, "cannot be read as a mesh: not a file", where=str(path), remedy="check the path"
         )
     with unpacked(path) as plain:
+        if is_geometry(plain):
+            return read_geometry(plain, str(path), meshing)
         module, function = _READERS.get(plain.suffix.lower(), _OTHERS)
         read: Callable[[Path, str], RawMesh] = getattr(import_module(module), function)
         return read(plain, str(path))
@@ -219,7 +229,7 @@ def _shell_cells(raw: RawMesh, wanted: Wanted, where: str) -> dict[int, IntArray
             "shells that cannot be assembled: " + _listing((name, counts[name]) for name in unsupported),
             where=where,
             limit=", ".join(_SHELLS_BY_MESHIO_NAME),
-            remedy="mesh with straight-sided elements of first order",
+            remedy="beside solids mesh with straight-sided elements of first order",
         )
     if not counts:
         raise FEImportError(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -23,10 +24,12 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.files.toml import as_spelt, choose
 from fe_import.interfaces.coupling import couple_interfaces
 from fe_import.interfaces.faces import InterfaceFace, interface_face
+from fe_import.mesh.geometry_files import Meshing, is_geometry
 from fe_import.mesh.read import Wanted, read_mesh
 from fe_import.model import Array, FEModel, IntArray, StressSource
 from fe_import.models.attached import AttachedNodes, Entries, add_attached, attached_constraints, attached_nodes
 from fe_import.models.hinges import check_hinges
+from fe_import.models.model import unit_factors
 from fe_import.models.shell import add_shells, shell_parts
 from fe_import.models.stretch import stretched
 
@@ -64,7 +67,22 @@ def mesh_of(link: LinkFile) -> SolidMesh:
         )
     sets = () if shell is None else tuple(region.set for region in shell.regions)
     wanted = Wanted(solid is not None, shell is not None, sets if solid is not None else ())
-    return read_mesh(path, (solid or shell or Shell()).ignore, wanted)
+    meshing = None if solid is None else _meshing(solid, unit_factors(description, where)[0], path, where)
+    return read_mesh(path, (solid or shell or Shell()).ignore, wanted, meshing)
+
+
+def _meshing(solid: Solid, unit: float, path: Path, where: str) -> Meshing | None:
+    """How a geometry is meshed; a mesh has its size and sets already."""
+    if is_geometry(path):
+        if solid.size is None:
+            message, remedy = "a geometry is meshed with elements of some size", "give size = LENGTH, as its thickness"
+            raise FEImportError(Cause.BAD_FIELD, message, where=f"{where}: solid.size", remedy=remedy)
+        return Meshing(solid.size, unit, solid.faces)
+    for name, value in (("size", solid.size), ("faces", solid.faces or None)):
+        if value is not None:
+            message = f"{path.name} is a mesh, no geometry: it has its elements and sets"
+            raise FEImportError(Cause.BAD_FIELD, message, where=f"{where}: solid.{name}", remedy="remove the field")
+    return None
 
 
 def mesh_model(mesh: SolidMesh, description: LinkDescription, where: str) -> FEModel:

@@ -102,24 +102,44 @@ class Partition:
 
 def partition(model: FEModel) -> Partition:
     """Matrices of a model, coupling eliminated, by interface and inner dofs."""
-    mass, stiffness = model.reduced_matrices()
     boundary = interface_places(model)
     inner = np.setdiff1d(np.arange(len(model.independent)), boundary)
-    rigid = model.rigid_body_modes()[model.independent]
-    centre = mass_properties(rigid.T @ (mass @ rigid)).centre_of_mass
+    fields = model.rigid_body_modes()
+    rigid = fields[model.independent]
+    centre = mass_properties(fields.T @ (model.mass @ fields)).centre_of_mass
     for axis in range(3):
         rigid[:, 3 + axis] -= rigid[:, :3] @ np.cross(np.eye(3)[axis], centre)
-    columns = stiffness[:, inner]
-    return Partition(
-        model,
-        boundary,
-        inner,
-        rigid,
-        mass @ rigid,
-        mass[:, inner][inner].tocsc(),
-        columns[inner].tocsc(),
-        columns[boundary].toarray().T,
+    unit = np.zeros((len(rigid), len(boundary)))
+    unit[boundary, np.arange(len(boundary))] = 1.0
+    forces, held = (
+        _reduced(model, matrix @ expanded(model, moved))
+        for matrix, moved in ((model.mass, rigid), (model.stiffness, unit))
     )
+    return Partition(
+        model, boundary, inner, rigid, forces, _inner(model, model.mass, inner), _inner(model, model.stiffness, inner),
+        np.ascontiguousarray(held[inner]),
+    )  # fmt: skip
+
+
+def _reduced(model: FEModel, loads: Array) -> Array:
+    """(f, k) loads on the independent dofs."""
+    return loads if model.coupling is None else np.asarray(model.coupling.T @ loads)
+
+
+def _inner(model: FEModel, matrix: sp.csc_array, inner: IntArray) -> sp.csc_array:
+    """(i, i) of a matrix over all components: a part of it, where nothing follows inner dofs."""
+    rows, coupling = model.independent[inner], model.coupling
+    if (coupling is not None and (np.diff(coupling.indptr)[inner] != 1).any()) or (np.diff(rows) <= 0).any():
+        own = sp.eye_array(matrix.shape[0], format="csc")[:, rows] if coupling is None else coupling[:, inner]
+        return (own.T @ matrix @ own).tocsc()
+    place = np.full(matrix.shape[0], -1, dtype=matrix.indices.dtype)
+    place[rows] = np.arange(len(rows))
+    to = place[matrix.indices]
+    kept = to >= 0
+    for column in np.flatnonzero(place < 0):  # few: what follows interfaces
+        kept[matrix.indptr[column] : matrix.indptr[column + 1]] = False
+    ends = np.concatenate([[0], np.cumsum(kept, dtype=matrix.indptr.dtype)])[matrix.indptr]
+    return sp.csc_array((matrix.data[kept], to[kept], np.append(ends[rows], ends[-1])), shape=(len(rows),) * 2)
 
 
 def constraint_modes(parts: Partition) -> Array:

@@ -36,7 +36,7 @@ def second_order(
     if count > MOST_MODES:
         return None, f"not available: more than {MOST_MODES} elastic modes; keep fewer (reduction.elastic_modes)"
     if model.second_order_lack:
-        return None, f"not available: {model.second_order_lack}"
+        return _along_line(model, shapes, reference, model.second_order_lack)
     if model.kind in ("solid", "shell"):
         if count > MOST_MODES_OF_SOLIDS:
             return None, (
@@ -61,10 +61,20 @@ def second_order(
                 "not available: members form a ring; cut it into links joined by loops, or give the link as 'solid'"
             )
         return frame_second_order(model, model.beams, shapes, reference, _stored_nodes(model, count)), "from its beams"
-    return None, (
-        "not available: bare matrices have no elements; give the link as 'frame' or 'solid', or split it into "
-        "several links"
-    )
+    return _along_line(model, shapes, reference, "matrices have no elements")
+
+
+def _along_line(model: FEModel, shapes: Array, reference: int, lack: str) -> tuple[SecondOrder | None, str]:
+    """Where elements do not tell, the line of the cross sections of a slender link may."""
+    from fe_import.second_order.cross_sections import NoSections
+    from fe_import.second_order.line import line_second_order
+
+    try:
+        return line_second_order(model, shapes, reference, _named_nodes(model))
+    except NoSections as reason:
+        return None, (
+            f"not available: {lack}, and {reason}; give the link as 'frame' or 'solid', or split it into several links"
+        )
 
 
 def _stored_nodes(model: FEModel, elastic_modes: int) -> IntArray:

@@ -16,10 +16,9 @@ from fe_import.modal.second_order import SecondOrder
 from fe_import.model import Array, BeamLines, FEModel, IntArray
 from fe_import.second_order.beams import INTEGRALS, POINTS, WEIGHTS, LineFields, line_fields
 from fe_import.second_order.composition import composed, composed_rotation, paired, twice_turned
-from fe_import.second_order.moments import of_inertia, of_inertias, of_masses, of_modes
+from fe_import.second_order.moments import Pair, of_body, of_inertias, of_masses, of_modes
 
 _AT_ONCE = 1_000_000  # numbers of a second-order field in memory at a time
-Pair = tuple[Array, Array]  # Ψ of a displacement and of a rotation vector, (3, n, n) each
 
 
 def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, reference: int, nodes: IntArray) -> SecondOrder:
@@ -39,8 +38,7 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
         Rising; whose fields are stored.
     """
     start = model.interface_nodes[reference].node
-    phi = shapes[model.dof_map[start, 3:]]
-    relative = _relative(model, shapes, start)
+    phi, relative = shapes[model.dof_map[start, 3:]], relative_to(model, shapes, start)
     wanted = {int(node): k for k, node in enumerate(nodes)}
     count = shapes.shape[1]
     first, second = np.triu_indices(count - 6)
@@ -56,16 +54,10 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
             for k in range(2):
                 stored[k, wanted[node]] = fields[k][:, first, second]
         if node in extra:
-            place = model.nodes[node]
-            moved = relative[model.dof_map[node]]
-            full = composed(fields[0], moved[:3], phi, place - model.nodes[start])
-            turned = composed_rotation(fields[1], moved[3:], phi)
             mass, inertia = extra[node]
-            masses = of_masses(np.array([mass]), place[None], full[None])
-            turning = of_inertia(inertia, phi + moved[3:], turned)
-            momentum, spin = momentum + masses[0] + turning[0], spin + masses[1] + turning[1]
-            own = shapes[model.dof_map[node], 6:]
-            modal = modal + of_modes(own, np.concatenate([masses[0][:3], turning[0][3:]]))
+            place, rows = model.nodes[node], model.dof_map[node]
+            terms = of_body(mass, inertia, place, place - model.nodes[start], relative[rows], shapes[rows], fields)
+            momentum, spin, modal = momentum + terms[0], spin + terms[1], modal + terms[2]
 
     at = {start: (np.zeros((3, count - 6, count - 6)), np.zeros((3, count - 6, count - 6)))}
     settle(start, at[start])
@@ -86,7 +78,7 @@ def frame_second_order(model: FEModel, beams: BeamLines, shapes: Array, referenc
     return SecondOrder(reference, momentum, spin, modal, nodes, stored[0], stored[1])
 
 
-def _relative(model: FEModel, shapes: Array, start: int) -> Array:
+def relative_to(model: FEModel, shapes: Array, start: int) -> Array:
     """(d, m) the modes without the rigid-body motion of the node ``start``; zero in the rigid-body modes."""
     motions = model.rigid_body_modes()
     rows = model.dof_map[start]

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from fe_import.model import Array
-from fe_import.second_order.composition import paired
+from fe_import.second_order.composition import composed, composed_rotation, paired
+
+Pair = tuple[Array, Array]  # Ψ of a displacement and of a rotation vector, (3, n, n) each
 
 LEVI_CIVITA = np.zeros((3, 3, 3))
 for _a, _b, _c in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
@@ -65,3 +67,27 @@ def of_inertias(inertia: Array, phi: Array, field: Array) -> tuple[Array, Array,
     twice = (product + product.transpose(0, 1, 3, 2)) / 2
     twice -= np.tensordot(inertia, phi.swapaxes(1, 2) @ phi, ([0], [0]))
     return momentum, once + twice, own
+
+
+def of_body(
+    mass: float, inertia: Array, place: Array, arm: Array, moved: Array, own: Array, fields: Pair
+) -> tuple[Array, Array, Array]:
+    """Momentum, spin and modal terms of a small body.
+
+    Parameters
+    ----------
+    mass : float
+    inertia : (3, 3) array
+    place, arm : (3,) arrays
+        Where it is, from the origin and from the reference.
+    moved, own : (6, m) arrays
+        Its displacement and rotation in the modes, relative to the reference and as they are.
+    fields : tuple of (3, n, n) arrays
+        Relative to the reference.
+    """
+    phi = own[3:] - moved[3:]  # of the reference
+    full, turned = composed(fields[0], moved[:3], phi, arm), composed_rotation(fields[1], moved[3:], phi)
+    masses = of_masses(np.array([mass]), place[None], full[None])
+    turning = of_inertia(inertia, own[3:], turned)
+    modal = of_modes(own[:, 6:], np.concatenate([masses[0][:3], turning[0][3:]]))
+    return masses[0] + turning[0], masses[1] + turning[1], modal

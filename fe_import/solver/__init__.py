@@ -1,7 +1,7 @@
 """Sparse solvers: the registry, and which one is used.
 
 The multifrontal one is used unless the environment variable ``ERLS_SOLVER`` names another. It has the speed of
-CHOLMOD with a good BLAS, needs no package and less memory than either of the others (`benchmarks/reduction.py`).
+Pardiso, needs no package and less memory than any of the others (`benchmarks/factorization.py`).
 """
 
 from __future__ import annotations

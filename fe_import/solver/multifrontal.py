@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import blas, lapack
+from scipy.sparse._sparsetools import csr_todense  # adds to what is there; nothing public does that in one pass
 
 from fe_import.model import Array, IntArray
 from fe_import.solver.base import SINGULAR, SingularMatrix
 from fe_import.solver.elimination import Elimination
 
-_PANEL = 64  # columns of a child added at a time; what is above the diagonal is left out but for the panel's corner
+_ADDED = 200_000  # entries of a child added at a time
 _TRUSTED = 1e-9  # of the diagonal; smaller pivots make the signs of later ones doubtful
 
 Advance = Callable[[int], None]
@@ -76,14 +77,14 @@ def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) 
     fronts = _Fronts([(matrix, 1.0)], elimination)
     inverses, rectangles = [], []
     for k, own, across in fronts:
-        triangle, failed = lapack.dpotrf(own, lower=1, clean=0)
+        triangle, failed = lapack.dpotrf(own, lower=1, clean=1)
         scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
         if failed or (triangle.diagonal() ** 2 <= SINGULAR * scale).any():
             raise SingularMatrix
         if len(across):
             across = blas.dtrsm(1.0, triangle, across, side=1, lower=1, trans_a=1, overwrite_b=1)
             fronts.eliminate_squared(k, across)
-        inverses.append(np.tril(lapack.dtrtri(triangle, lower=1, overwrite_c=1)[0]))
+        inverses.append(lapack.dtrtri(triangle, lower=1, overwrite_c=1)[0])
         rectangles.append(across)
         advance(k)
     return MultifrontalFactor(elimination, tuple(inverses), tuple(rectangles))
@@ -206,12 +207,20 @@ class _Fronts:
     def _extend(self, front: Array, to: IntArray, left: Array) -> None:
         """Add what a child left over; rows rise, so lower triangles stay lower triangles."""
         own = front.shape[1]
-        inner = int(np.searchsorted(to, own))
+        inner, rows = int(np.searchsorted(to, own)), to.astype(np.int32)
         for target, begin, end, shift in ((front, 0, inner, 0), (self._rest, inner, len(to), own)):
-            flat, height = target.T.reshape(-1), len(target)
-            for j in range(begin, end, _PANEL):
-                stop = min(j + _PANEL, end)
-                flat[(to[j:stop, None] - shift) * height + (to[j:] - shift)] += left.T[j:stop, j:]
+            height, many = len(target), len(to) - begin
+            step = max(1, _ADDED // max(1, many))
+            for first in range(begin, end, step):
+                # columns of the child are rows of a sparse matrix, whose entries go where its columns say
+                stop = min(first + step, end)
+                columns = to[first:stop] - shift
+                part = target.T[columns[0] : columns[-1] + 1]
+                starts = np.zeros(len(part) + 1, dtype=np.int32)
+                starts[columns - columns[0] + 1] = many
+                np.cumsum(starts, out=starts)
+                places = np.tile(rows[begin:] - shift, stop - first)
+                csr_todense(len(part), height, starts, places, left.T[first:stop, begin:].reshape(-1), part)
 
     def eliminate_squared(self, front: int, across: Array) -> None:
         """Leave rest - across acrossᵀ to the parent."""

@@ -205,8 +205,11 @@ def _residual(
     force = stiffness @ modes
     left = force - mass @ modes * values
     size = np.linalg.norm(force, axis=0)
+    share = np.linalg.norm(left, axis=0) / size
+    if share.max() <= _RESIDUAL:
+        return float(share.max())
     rounding = _ROUNDING * np.linalg.norm(abs(stiffness) @ np.abs(modes), axis=0) / size
-    figure = float((np.linalg.norm(left, axis=0) / size - rounding).max())
+    figure = float((share - rounding).max())
     if figure <= _RESIDUAL:
         return figure
     work = np.einsum("dk,dk->k", left, solve(left)).clip(min=0)

@@ -160,8 +160,8 @@ def test_tight_reference_has_all_that_the_scene_and_its_links_know(
 
 
 def test_links_without_second_order_make_a_linear_reference() -> None:
-    """Exported matrices: the study says that what linear links leave out is not counted."""
-    scene = erls.load_scene(DATA / "calculix/l_pendulum.toml", ["simulation.duration=0.002", "simulation.step=1e-3"])
+    """Members that form a ring: the study says that what linear links leave out is not counted."""
+    scene = erls.load_scene(DATA / "thermal/bimetal.toml", ["simulation.duration=0.002", "simulation.step=1e-3"])
     assert knows_second_order(scene) is False
     found = make_reference(scene, "tight", (scene.record.points[0].name,), 1e-4, 240.0)
     assert found.linear

@@ -49,8 +49,8 @@ def test_a_spin_that_takes_the_stiffness_keeps_them() -> None:
 
 
 def test_what_cannot_be_cured_ends_a_strict_run(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Matrices alone know no stiffening: exit code 4, the run kept; without --strict a warning."""
-    arguments = ["simulate", str(DATA / "calculix/l_pendulum.toml"), "--set", "effects=auto"]
+    """Members that form a ring know no stiffening: exit code 4, the run kept; without --strict a warning."""
+    arguments = ["simulate", str(DATA / "thermal/bimetal.toml"), "--set", "effects=auto"]
     arguments += ["--set", "simulation.effects_tolerance=1e-7", "--set", "simulation.duration=0.1"]
     assert main([*arguments, "--json"]) == 0
     assert any("estimated to be off" in w for w in json.loads(capsys.readouterr().out)["warnings"])

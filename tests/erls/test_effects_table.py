@@ -116,10 +116,10 @@ def test_what_auto_leaves_out_is_off(capsys: pytest.CaptureFixture[str]) -> None
     assert "auto leaves out" in found["decision"]
 
 
-def test_bare_matrices_say_why_they_have_no_stiffening(capsys: pytest.CaptureFixture[str]) -> None:
+def test_links_say_why_they_have_no_stiffening(capsys: pytest.CaptureFixture[str]) -> None:
     """As a run does."""
     effects = "effects=all,geometric_stiffening"
-    found, rows, text = _table(capsys, DATA / "calculix/l_pendulum.toml", effects, "simulation.duration=0.1")
+    found, rows, text = _table(capsys, DATA / "thermal/bimetal.toml", effects, "simulation.duration=0.1")
     assert not rows["geometric_stiffening"]["present"]
     assert "has no geometric stiffening and foreshortening" in found["missing"][0]
     assert "has no geometric stiffening and foreshortening" in text.replace("\n", " ")

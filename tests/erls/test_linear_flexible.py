@@ -229,7 +229,8 @@ def test_step_response_ends_in_the_static_one(tmp_path: Path) -> None:
     assert np.diff(telling_frequencies(model)).min() > 0
 
 
-def test_root_locus_over_a_spring(tmp_path: Path) -> None:
+@pytest.mark.parametrize("formulation", ["erls", "nodal"])
+def test_root_locus_over_a_spring(tmp_path: Path, formulation: str) -> None:
     """A rigid rod upright on a spring: s² = (m g l / 2 - k) / I, unstable below k = m g l / 2, exact."""
     rod = loop_scenes.bar(1.0, 2.0)
     joint = loop_scenes.joint("hinge", 1.0, 90.0, stiffness=0.0, rest_deg=90.0)
@@ -241,7 +242,7 @@ def test_root_locus_over_a_spring(tmp_path: Path) -> None:
     }
     path = scenes.write_toml(tmp_path / "rod.toml", data)
     values = [0.0, 5.0, 15.0]
-    found = root_locus(path, "joints.hinge.stiffness", values)
+    found = root_locus(path, "joints.hinge.stiffness", values, changes=[f"simulation.formulation={formulation}"])
     squares = np.array([model.modes[0].pole ** 2 for model in found.models])
     np.testing.assert_allclose(squares, (9.81 - np.array(values)) / (2.0 / 3), rtol=1e-9)
     assert [bool(model.unstable) for model in found.models] == [True, True, False]

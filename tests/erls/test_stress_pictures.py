@@ -92,7 +92,7 @@ def _volume(places: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:
 
 def test_thickness_closes_a_surface() -> None:
     """Two unit squares, flat and folded by a right angle: with a rim they enclose thickness times area, seen from
-    outside; at the fold both sides keep their thickness.
+    outside; at the fold both sides keep their thickness, as far at one end of it as at the other, however they are cut.
     """
     flat = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [2, 0, 0], [2, 1, 0]], dtype=float)
     folded = flat.copy()
@@ -104,4 +104,5 @@ def test_thickness_closes_a_surface() -> None:
         edges = np.sort(whole[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()
         assert _volume(where, whole) == pytest.approx(0.2, rel=1e-9)
+        np.testing.assert_allclose(where[7] - places[1], where[8] - places[2], atol=1e-12)
         np.testing.assert_array_equal(values, np.tile(np.arange(6.0), 3))

@@ -71,6 +71,14 @@ def calculix_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
     return calculix_frequencies(folder, deck, 12)[6:]
 
 
+def deck_bracket(folder: Path) -> NDArray[np.float64]:
+    """The same from the deck that CalculiX was given: its elements of eight nodes, its section and its material."""
+    shell = {"mesh": "judge.inp", "nodes": {"c": [0.2, 0.05, 0.0]}}
+    return _frequencies(write_toml(folder / "deck.toml", {
+        "shell": shell, "interfaces": [{"name": "hub", "node": "c"}],
+    }))  # fmt: skip
+
+
 def solid_bracket(folder: Path, turns: int) -> NDArray[np.float64]:
     """The same of hexahedra of 20 nodes about the same middle surface, mitred at the fold."""
     grid = bracket(turns)

@@ -17,6 +17,7 @@ from fe_import.description.link import LinkFile, load_link, with_numbers
 from fe_import.elements.frame import assemble_frame
 from fe_import.elements.sections import SectionConstants
 from fe_import.errors import Cause, FEImportError
+from fe_import.modal.held_shapes import arrays_in
 from fe_import.model import FEModel
 from fe_import.models.frame import frame_mesh
 from fe_import.models.model import build_model
@@ -146,6 +147,19 @@ def test_material_scales_matrices_alone(of: str) -> None:
     }.items():
         largest = np.abs(damping if name == "damping" else _array(own, name)).max()
         assert np.abs(arrays[name] - expected).max() <= 1e-9 * largest, name
+
+
+@pytest.mark.parametrize("key", [WIDTH, "frame.nodes.tip.0"])
+def test_every_array_by_steps_of_other_sizes(key: str) -> None:
+    """Of twice the size: as Richardson's, of what is left out sixteen times as much; to 1e-8, measured 1e-9."""
+    link = _coarse(load_link(ARM))
+    found = modal_derivatives(link, key)
+    wider = modal_derivatives(link, key, 2 * found.value)
+    whole = arrays_in(found.model, np.eye(len(found.model.stiffness)))
+    assert found.arrays.keys() == whole.keys()
+    for name, array in found.arrays.items():
+        scale = max(np.abs(found.value * array).max(), np.abs(whole[name]).max())
+        assert np.abs(found.value * (wider.arrays[name] - array)).max() <= 1e-8 * scale, name
 
 
 def _array(model: object, name: str) -> np.ndarray:

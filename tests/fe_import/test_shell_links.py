@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from calculix import NEEDS_CALCULIX
 from link_files import write_toml
-from shell_brackets import calculix_bracket, shell_bracket, solid_bracket
+from shell_brackets import calculix_bracket, deck_bracket, shell_bracket, solid_bracket
 from shell_meshes import ShellGrid, shell_grid, write_deck
 
 from fe_import.description.link import load_link
@@ -93,8 +93,12 @@ def tip_drop(model: ModalModel) -> np.ndarray:
 
 @NEEDS_CALCULIX
 def test_frequencies_of_a_bracket_are_those_of_calculix(tmp_path: Path) -> None:
-    """Quadratic shells (S8R) of CalculiX on the same mesh, with nodes in the middle of the sides: six to 2 %."""
-    np.testing.assert_allclose(shell_bracket(tmp_path, 2), calculix_bracket(tmp_path, 2), rtol=0.02)
+    """Quadratic shells (S8R) of CalculiX on the same mesh, with nodes in the middle of the sides: six to 2 %, from the
+    very deck that it reads, too.
+    """
+    judge = calculix_bracket(tmp_path, 2)
+    np.testing.assert_allclose(shell_bracket(tmp_path, 2), judge, rtol=0.02)
+    np.testing.assert_allclose(deck_bracket(tmp_path), judge, rtol=0.02)
 
 
 def test_frequencies_of_a_bracket_are_those_of_a_solid(tmp_path: Path) -> None:
@@ -241,6 +245,28 @@ def test_meshes_of_shells_are_checked(tmp_path: Path) -> None:
         folder.mkdir(exist_ok=True)
         with pytest.raises(FEImportError, match=told):
             reduce_link(link(folder, ShellGrid(nodes, elements, "quad4", grid.at)))
+
+
+@pytest.mark.parametrize("kind", ["quad4", "tri3"])
+def test_surfaces_of_second_order_are_cut(tmp_path: Path, kind: str) -> None:
+    """S8R and S6 are the link of a mesh twice as fine, with their sets; a node that is not there is told."""
+    grid = strip(kind, nx=6)
+    fine = reduce_link(link(tmp_path, grid))
+    at = np.array([grid.at[a : a + 3, b : b + 3].ravel() for a in (0, 2, 4) for b in (0, 2)])
+    rows = at[:, [0, 6, 8, 2, 3, 7, 5, 1]] if kind == "quad4" else at[:, [[0, 6, 8, 3, 7, 4], [0, 8, 2, 4, 5, 1]]]
+    elements = rows.reshape(-1, 8 if kind == "quad4" else 6)
+    head, _, tail = (tmp_path / "mesh.inp").read_text().partition("*ELEMENT")
+    lines = [", ".join(map(str, [k + 1, *(row + 1)])) for k, row in enumerate(elements)]
+    own = [f"*ELEMENT, TYPE={'S8R' if kind == 'quad4' else 'S6'}, ELSET=PLATE", *lines, "*NSET"]
+    deck = head + "\n".join(own) + tail.partition("*NSET")[2]
+    (tmp_path / "mesh.inp").write_text(deck)
+    region = {"set": "PLATE", "material": "m", "thickness": 0.005}
+    data = {"materials": {"m": ALU}, "shell": {"mesh": "mesh.inp", "regions": [region]}, "interfaces": ENDS}
+    cut = reduce_link(write_toml(tmp_path / "cut.toml", data))
+    np.testing.assert_allclose(cut.frequencies_hz[6:], fine.frequencies_hz[6:], rtol=1e-8)
+    (tmp_path / "mesh.inp").write_text(deck.replace(lines[-1], lines[-1] + "99"))
+    with pytest.raises(FEImportError, match=r"node"):
+        reduce_link(tmp_path / "cut.toml")
 
 
 def test_decks_bring_their_sections(tmp_path: Path) -> None:
