@@ -300,9 +300,7 @@ def _link(link: LinkRecord, model: ModalModel, k: int, file: str) -> Link:
     if link.outboard:
         _interface(model, link.outboard, f"{place}.outboard")
     omega = 2 * np.pi * model.frequencies_hz
-    ratios = model.damping_ratios
-    if link.damping is not None:
-        ratios = damping_ratios(link.damping, omega, place)
+    ratios = model.damping_ratios if link.damping is None else damping_ratios(link.damping, omega, place)
     return Link(
         name=link.name,
         model=model,
@@ -323,15 +321,11 @@ def _seat(scene: Scene, k: int, links: Sequence[Link]) -> InterfaceNode | None:
         return _interface(link.model, joint.at, f"{file}: joints[{k}].at")
     others = [i.name for i in link.model.interface_nodes if i.name != link.inboard.name]
     if not record.outboard and not others:
-        raise SceneError(
-            Cause.BAD_REFERENCE,
-            "this link has no second interface for the next joint",
-            where=f"{file}: links[{parent}].outboard",
-            value=link.name,
-            remedy="add an interface to the link description"
-            if record.rigid is None
-            else f"give links[{parent}].rigid.points two points: the first where its own joint sits, then this one",
-        )
+        message, remedy = "this link has no second interface for the next joint", "add an interface to the description"
+        if record.rigid is not None:
+            remedy = f"give links[{parent}].rigid.points two points: the first where its own joint sits, then this one"
+        where = f"{file}: links[{parent}].outboard"
+        raise SceneError(Cause.BAD_REFERENCE, message, where=where, value=link.name, remedy=remedy)
     return _interface(link.model, record.outboard or others[0], f"{file}: links[{parent}].outboard")
 
 
