@@ -72,7 +72,8 @@ def cholmod(matrix: Any, positions: Any, repeats: int) -> Result:
     for method in ("metis", "nesdis", "amd"):
         order = least(repeats, lambda: cholmod.analyze(matrix, ordering_method=method, mode="supernodal"))  # noqa: B023
         factor = least(repeats, lambda: order[2].cholesky(matrix))  # noqa: B023
-        libraries = [line.split()[-1] for line in Path("/proc/self/maps").read_text().splitlines() if "blas" in line]
+        mapped = Path("/proc/self/maps").read_text(encoding="utf-8").splitlines()
+        libraries = [line.split()[-1] for line in mapped if "blas" in line]
         blas = next(iter(libraries), "")
         found.append(measured(order, factor, f"scikit-sparse {sksparse.__version__}, {method}, {Path(blas).resolve()}"))
     return min(found, key=lambda r: float(r["order_cpu_s"] + r["factor_cpu_s"]))

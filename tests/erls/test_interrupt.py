@@ -37,9 +37,9 @@ def tell(self, done, total):
 
 reduce_cached = erls.scene.build.reduce_cached
 
-def tell_reduction(*arguments):
+def tell_reduction(*given, **named):
     print("reducing", file=sys.stderr, flush=True)
-    return reduce_cached(*arguments)
+    return reduce_cached(*given, **named)
 
 Progress.advance, erls.scene.build.reduce_cached = tell, tell_reduction
 sys.exit(main())
