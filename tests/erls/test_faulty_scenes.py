@@ -193,6 +193,6 @@ def test_a_faulty_joint_is_found_before_links_are_reduced(
     folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A reduction may take minutes; what does not depend on it is checked first."""
-    monkeypatch.setattr("erls.scene.build.reduce_cached", lambda *_: pytest.fail("reduced too early"))
+    monkeypatch.setattr("erls.scene.build.reduce_cached", lambda *_, **__: pytest.fail("reduced too early"))
     for fault in ("table with NaN", "alpha twice", "point on an unknown link", "payload on an unknown point"):
         test_faulty_scene(fault, folder, capsys)
