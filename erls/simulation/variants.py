@@ -77,7 +77,6 @@ class Variants:
         progress: Progress,
         verdict: bool = True,
         bending: bool = True,
-        changes: Changes = (),
     ) -> Run | ReportedError:
         """The run of a variant, or its failure.
 
@@ -90,14 +89,20 @@ class Variants:
             Whether the run states its error.
         bending : bool
             Whether it looks at how far off links are that bend, without a verdict, too.
-        changes : sequence of (str, value)
-            As of `scene`.
         """
         try:
             progress(0.0, 0.0)
-            scene = self.scene(overrides, changes)
-            like = self._alike(scene)
-            asked = Asked(progress, lambda text: None, None, False, like, verdict, bending=bending or verdict)
+            scene = self.scene(overrides)
+        except ReportedError as problem:
+            return problem
+        return self.run_scene(scene, progress, verdict, bending)
+
+    def run_scene(
+        self, scene: AnyScene, progress: Progress, verdict: bool = True, bending: bool = True
+    ) -> Run | ReportedError:
+        """The same of a variant that was read."""
+        asked = Asked(progress, lambda text: None, None, False, self._alike(scene), verdict, bending=bending or verdict)
+        try:
             run = run_as_asked(scene, asked)
         except ReportedError as problem:
             return problem

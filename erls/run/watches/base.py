@@ -25,9 +25,11 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
+import numpy as np
+
 from erls.equations.formulation import Formulation
 from erls.equations.registry import TREES
-from erls.equations.serial.state_series import StateSeries
+from erls.equations.serial.state_series import StateSeries, state_series
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Solution
 from erls.mechanism.chain import Mechanism
@@ -130,8 +132,12 @@ class Ended:
 
     @cached_property
     def seen(self) -> StateSeries:
-        """States at about a hundred times along it."""
-        return self.run.series(self.run.looks(_LOOKS))
+        """States at about a hundred times along it: some of those that the run holds, where it holds as many."""
+        held = self.run.solution
+        if len(held.t) < _LOOKS:
+            return self.run.series(self.run.looks(_LOOKS))
+        some = np.linspace(0, len(held.t) - 1, _LOOKS).astype(np.int64)
+        return state_series(self.run.formulation, held.t[some], held.y[some], held.v[some])
 
     @property
     def meaningless(self) -> bool:

@@ -13,6 +13,7 @@ import numpy as np
 from erls.errors import Cause, SimulationError
 from erls.run.record import Run
 from erls.scene.chain import Scene
+from erls.scene.read import AnyScene
 from erls.simulation.variants import Variants
 from erls.studies.sweep.quantities import quantity, values_of
 from erls.studies.sweep.store import Row
@@ -89,8 +90,14 @@ def _varied(task: Task, values: Sequence[Any]) -> list[tuple[str, Any]]:
 
 
 def evaluate(task: Task) -> list[Row]:
-    """Run them; what fails is a row, too."""
-    return [row_of(task, number, values, run_point(task, number, values)) for number, values in task.rows]
+    """Run them; what fails is a row, too.
+
+    First all are read, then all are run, then all are asked for their numbers: what is done between two integrations
+    takes a third longer where each of them has driven it out of the processor's cache.
+    """
+    scenes = [_scene(task, values) for _, values in task.rows]
+    runs = [_run(task, number, scene) for (number, _), scene in zip(task.rows, scenes, strict=True)]
+    return [row_of(task, *point, run) for point, run in zip(task.rows, runs, strict=True)]
 
 
 def looks_at_bending(number: int) -> bool:
@@ -102,8 +109,20 @@ def looks_at_bending(number: int) -> bool:
 
 def run_point(task: Task, number: int, values: Sequence[Any]) -> Run | ReportedError:
     """The run of a point, or its failure."""
-    changes = _varied(task, values)
-    return _variants(task).run((), lambda t, duration: None, task.verdict, looks_at_bending(number), changes)
+    return _run(task, number, _scene(task, values))
+
+
+def _scene(task: Task, values: Sequence[Any]) -> AnyScene | ReportedError:
+    try:
+        return _variants(task).scene((), _varied(task, values))
+    except ReportedError as problem:
+        return problem
+
+
+def _run(task: Task, number: int, scene: AnyScene | ReportedError) -> Run | ReportedError:
+    if isinstance(scene, ReportedError):
+        return scene
+    return _variants(task).run_scene(scene, lambda t, duration: None, task.verdict, looks_at_bending(number))
 
 
 def numbers_of(run: Run, quantities: Sequence[str] | Reduction) -> dict[str, float]:
