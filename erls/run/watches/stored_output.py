@@ -84,10 +84,8 @@ def _places(run: ChainRun, middles: IntArray, reach: int) -> Array:
         ends = [k - reach, k + reach] if reach else [k]
         found.append([x[0] for x in hermite(s.t[ends], s.y[ends], s.v[ends], s.a[ends], s.t[[k]])])
     y, v = (np.array(part) for part in zip(*found, strict=True))
-    states = state_series(run.formulation, s.t[middles], y, v).states()
-    mechanism = run.formulation.mechanism
+    states, mechanism = state_series(run.formulation, s.t[middles], y, v), run.formulation.mechanism
     nodes = [(p.link, np.array([p.node])) for p in mechanism.points] or [
         (k, np.array([i.node for i in link.model.interface_nodes])) for k, link in enumerate(mechanism.links)
     ]
-    mechanism = run.formulation.mechanism
-    return np.array([np.concatenate([node_positions(mechanism, state, *own) for own in nodes]) for state in states])
+    return np.concatenate([node_positions(mechanism, states, *own) for own in nodes], axis=1)
