@@ -10,7 +10,9 @@ from sweep_cases import GRID, SCENE, SHORT
 
 import erls
 from erls.errors import Cause, SceneError
-from erls.studies.sweep.points import SAMPLERS, points_of, sampled
+from erls.studies.sweep.chunks import Chunks
+from erls.studies.sweep.evaluate import Task
+from erls.studies.sweep.points import SAMPLERS, Grid, points_of, sampled
 from erls.studies.sweep.quantities import quantity, values_of
 
 # ----- points
@@ -110,3 +112,18 @@ def test_quantities_that_do_not_exist_end_a_sweep_at_once() -> None:
     """Not after a thousand failures."""
     with pytest.raises(SceneError, match=r"tipp\.z"):
         erls.sweep(SCENE, GRID, ["max(tipp.z)"], overrides=SHORT)
+
+
+def test_points_with_the_same_links_go_to_one_worker() -> None:
+    """Chunks end where links change, none is twice as long as asked for, and every point is in one of them."""
+    height = "links.l.model.sections.leg.height"
+    points = Grid({height: (0.009, 0.01, 0.011), "joints.shoulder.initial.position_deg": tuple(map(float, range(25)))})
+    task = Task(Path("scene.toml"), (), points.keys, [], ("tip.z@end",), False)
+    for size, most in ((1, 1), (16, 31), (10, 19)):
+        tasks = Chunks(task, points, range(3, 75), size)
+        chunks = [[number for number, _ in part.rows] for part in tasks]
+        assert [number for chunk in chunks for number in chunk] == list(range(3, 75))
+        assert max(map(len, chunks)) <= most
+    chunks = [[values[0] for _, values in part.rows] for part in Chunks(task, points, range(75), 16)]
+    assert [set(chunk) for chunk in chunks] == [{0.009}, {0.01}, {0.011}]
+    assert len(Chunks(task, points, [], 16)) == 0

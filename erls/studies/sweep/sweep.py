@@ -22,6 +22,7 @@ from erls.scene.inputs import files_of
 from erls.scene.read import load_scene
 from erls.studies.kept import content_of
 from erls.studies.pool import each
+from erls.studies.sweep.chunks import Chunks
 from erls.studies.sweep.evaluate import (
     Reduction,
     Task,
@@ -273,25 +274,6 @@ def _check_same(base: Store, now: Mapping[str, Any]) -> None:
             )
 
 
-@dataclass(frozen=True)
-class _Tasks(Sequence[Task]):
-    """Points in chunks, each made when it is asked for."""
-
-    task: Task
-    points: Points
-    numbers: Sequence[int]
-    size: int
-
-    def __len__(self) -> int:
-        return -(-len(self.numbers) // self.size)
-
-    def __getitem__(self, k: Any) -> Any:
-        chunk = self.numbers[k * self.size : (k + 1) * self.size]
-        if not chunk:
-            raise IndexError(k)
-        return replace(self.task, rows=[(number, self.points.row(number)) for number in chunk])
-
-
 class _Engine:
     """Runs points and keeps them as they come."""
 
@@ -339,7 +321,7 @@ class _Engine:
 
     def _evaluated(self, todo: list[int], executor: Any, workers: int | None) -> Iterator[list[Row]]:
         size = max(1, min(_MOST_IN_CHUNK, int(_CHUNK_S / max(self.each_s, 1e-3))))
-        tasks = _Tasks(self.task, self.points, todo, size)
+        tasks = Chunks(self.task, self.points, todo, size)
         if executor is not None:
             yield from evaluated(evaluate, tasks, executor, workers_of(executor, workers))
             return
