@@ -14,6 +14,14 @@ from erls.view.figure import DEFLECTION, STRESS, Figure
 from erls.view.stress import no_stress
 
 
+def holds_stress(run: Run) -> bool:
+    """Whether links or shells of a run tell their stress; the amplitude of a mode means nothing, and so does its."""
+    if isinstance(run, ChainRun):
+        models = [run.formulation.mechanism.links[k].model for k in run.formulation.mechanism.bodies]
+        return any(model.recovery is not None and model.recovery.quantity == "stress" for model in models)
+    return isinstance(run, BodyRun) and not isinstance(run, BodyMode) and bool(run.assembly.shells)
+
+
 def figure_of(run: Run, magnification: float = 1.0, stress: bool = False) -> Figure:
     """What is drawn of a run; ``stress`` says that colours do, rather than deflection.
 
@@ -25,8 +33,7 @@ def figure_of(run: Run, magnification: float = 1.0, stress: bool = False) -> Fig
     """
     shade = STRESS if stress else DEFLECTION
     if isinstance(run, ChainRun):
-        links = [run.formulation.mechanism.links[k].model for k in run.formulation.mechanism.bodies]
-        if stress and not any(m.recovery is not None and m.recovery.quantity == "stress" for m in links):
+        if stress and not holds_stress(run):
             raise no_stress(run)
         return ChainFigure(run, shade)
     assert isinstance(run, BodyRun)
@@ -39,6 +46,6 @@ def figure_of(run: Run, magnification: float = 1.0, stress: bool = False) -> Fig
     if stress and isinstance(run, BodyMode):
         message, remedy = "modes have no scale, and their stress neither", "leave stress out"
         raise SceneError(Cause.BAD_FIELD, message, where="stress", value=run.title, remedy=remedy)
-    if stress and not run.assembly.shells:
+    if stress and not holds_stress(run):
         raise no_stress(run)
     return BodyFigure(run, shade)

@@ -4,22 +4,36 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Collection, Iterator, Sequence
+from typing import TYPE_CHECKING, TypeAlias
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
 from erls.maths.so3 import Array
-from erls.report.html import Curve, Plot, Shape, code, figure, frames_of, heading, page, paragraph, table, view
+from erls.report.html import (
+    Curve,
+    Plot,
+    Shape,
+    code,
+    figure,
+    folded,
+    frames_of,
+    heading,
+    page,
+    paragraph,
+    table,
+    view,
+)
 from erls.report.runs import run_report
 from erls.run.chain.run import ChainRun
-from erls.run.record import Run
+from erls.run.record import Run, plain
 from erls.run.tables import Quantity, quantities
 from erls.studies.outputs import run_outputs
 from erls.studies.spectrum import amplitude_spectrum, peaks
-from erls.view.figures import figure_of
+from erls.view.figure import PartMesh
+from erls.view.figures import figure_of, holds_stress
 from fe_import.files.versions import package_version
 
 if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
@@ -27,6 +41,8 @@ if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
 
 _TIMES = 1001
 _NOTHING = 1e-9  # of the largest load of a kind: what rounding leaves
+_LEAST_SHARE = 1e-12
+_TWICE = ("angle", "coordinate")
 _PROGRAMS = ("erls", "numpy", "scipy", "numba", "h5py")
 _PARTS = {
     "integration": "steps and iterations, over the whole run",
@@ -41,6 +57,9 @@ _GROUPS = {
     "rate": "Joint rates",
     "effort": "Joint efforts",
 }
+
+
+_Quantities: TypeAlias = Sequence[tuple[str, Quantity]]
 
 
 def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
@@ -60,7 +79,8 @@ def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
         from erls.run.bodies.rest import BodyPath
 
         parts += _path(run) if isinstance(run, BodyPath) else ()
-    parts += _histories(x, along.values, found)
+    sensors = {plain(sensor.name) for sensor in getattr(run, "sensors", ())}
+    parts += _histories(x, along.values, found, sensors)
     if isinstance(run, ChainRun) and len(times) > 2:
         parts += _modes(run, times)
     parts += _solver(run, repeat)
@@ -93,7 +113,7 @@ def _metres(value: object) -> str:
 
 def _moving(run: Run) -> Iterator[str]:
     """The mechanism in space."""
-    drawn = figure_of(run)
+    drawn = figure_of(run, stress=holds_stress(run))
     first = drawn.poses([run.start])[0].meshes(0.0)
     kept = [_cells(mesh.cells, len(mesh.points)) for mesh in first]
     carried = [
@@ -102,6 +122,7 @@ def _moving(run: Run) -> Iterator[str]:
     ]
     times = run.spread(frames_of(sum(len(nodes) for nodes, _ in carried)))
     poses = [pose.meshes(0.0) for pose in drawn.poses(times)]
+    stress = [_stress([pose[k] for pose in poses], nodes) for k, (nodes, _, _) in enumerate(kept)]
     shapes = [
         Shape(
             mesh.name,
@@ -110,12 +131,20 @@ def _moving(run: Run) -> Iterator[str]:
             np.array([pose[k].points[nodes] for pose in poses]),
             np.array([pose[k].displacement[nodes] for pose in poses]),
             weights,
+            stress[k],
         )
         for k, (mesh, (_, lines, triangles), (nodes, weights)) in enumerate(zip(first, kept, carried, strict=True))
     ]
     yield heading("Motion" if run.axis.unit == "s" else "Path")
-    title = "Turn it by dragging; colours show how far links are bent"
+    colours = "how far links are bent" if all(one is None for one in stress) else "how far links are bent, or stress"
+    title = f"Turn it by dragging; colours show {colours}"
     yield view(title, run.axis.symbol, run.axis.unit, times, shapes)
+
+
+def _stress(meshes: Sequence[PartMesh], nodes: NDArray[np.int64]) -> Array | None:
+    """(f, n) at the nodes that are drawn; None of a part that tells none."""
+    told = [mesh.more.get("von_mises_MPa") for mesh in meshes]
+    return None if any(one is None for one in told) else np.array([one[nodes] for one in told if one is not None])
 
 
 def _path(run: BodyPath) -> Iterator[str]:
@@ -170,39 +199,77 @@ def _carried(points: Array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64]
     return nodes[chosen], weights
 
 
-def _histories(x: str, along: Array, found: Sequence[tuple[str, Quantity]]) -> Iterator[str]:
-    """Plots of all columns: vectors by themselves, scalars of a kind together."""
-    vectors = [(name, q) for name, q in found if q.values.ndim == 2]
+def _histories(x: str, along: Array, found: _Quantities, sensors: Collection[str]) -> Iterator[str]:
+    """Plots of all columns: vectors by themselves, scalars of a kind together, and what sensors read."""
+    read = [one for one in found if one[0] in sensors or one[0].rpartition(".")[0] in sensors]
+    known = [one for one in found if one not in read]
+    vectors = [(name, q) for name, q in known if q.values.ndim == 2]
+    yield from _vectors("Places", x, along, [(name, q) for name, q in vectors if q.unit == "m"])
+    yield from _scalars(x, along, [(name, q) for name, q in known if q.values.ndim == 1])
+    yield from _vectors("Forces and moments", x, along, [(name, q) for name, q in vectors if q.unit != "m"])
+    if read:
+        yield heading("Sensors")
+    for name, q in read:
+        parts = [("", q.values)] if q.values.ndim == 1 else list(zip("xyz", q.values.T, strict=True))
+        yield figure(Plot(name, x, f"reading [{q.unit}]", [Curve(part, along, values) for part, values in parts]))
+
+
+def _scalars(x: str, along: Array, found: _Quantities) -> Iterator[str]:
+    """A plot for each kind and unit; angles that are the coordinates are not shown twice."""
     grouped: dict[tuple[str, str], list[Curve]] = {}
     for name, q in found:
-        if q.values.ndim == 1:
-            base, _, last = name.rpartition(".")
-            kind = "Energy" if base == "energy" else _GROUPS.get(last, "Further readings")
-            label = last if kind == "Energy" else base if kind in _GROUPS.values() else name
-            grouped.setdefault((kind, q.unit), []).append(Curve(label, along, q.values))
-    places = [(name, q) for name, q in vectors if q.unit == "m"]
-    if places:
-        yield heading("Places")
-        yield from (_vector(x, along, name, q) for name, q in places)
+        base, _, last = name.rpartition(".")
+        kind = "Energy" if base == "energy" else _GROUPS.get(last, "Further readings")
+        label = last if kind == "Energy" else base if kind in _GROUPS.values() else name
+        grouped.setdefault((kind, q.unit), []).append(Curve(label, along, q.values))
+    angles, coordinates = ([c for (kind, _), own in grouped.items() if kind == _GROUPS[of] for c in own] for of in _TWICE)
+    same = _alike(angles, coordinates)
     for kind in dict.fromkeys(kind for kind, _ in grouped):
+        if same and kind == _GROUPS["angle"]:
+            continue
         yield heading(kind)
+        if same and kind == _GROUPS["coordinate"]:
+            yield paragraph("Joint angles are the same.", "note")
         for (one, unit), curves in grouped.items():
-            if one == kind:
+            if one != kind:
+                continue
+            if any(_largest(curve.y) > 0 for curve in curves):
                 yield figure(Plot("", x, f"{kind.lower()} [{unit}]", curves))
-    loads = [(name, q) for name, q in vectors if q.unit != "m"]
-    if loads:
-        yield heading("Forces and moments")
-        largest = {q.unit: max(_largest(one) for _, one in loads if one.unit == q.unit) for _, q in loads}
-        yield from (_vector(x, along, name, q, _NOTHING * largest[q.unit]) for name, q in loads)
+            else:
+                yield paragraph(f"{', '.join(curve.label for curve in curves)}: 0 {unit} all along.", "note")
 
 
-def _largest(q: Quantity) -> float:
-    return float(np.abs(q.values[np.isfinite(q.values)]).max(initial=0.0))
+def _alike(some: Sequence[Curve], others: Sequence[Curve]) -> bool:
+    """Whether curves of the same names are there, and the same but for rounding."""
+    known = {curve.label: curve.y for curve in others}
+    return len(some) == len(known) > 0 and all(
+        curve.label in known and np.allclose(curve.y, known[curve.label], rtol=1e-12, atol=1e-12, equal_nan=True)
+        for curve in some
+    )
 
 
-def _vector(x: str, along: Array, name: str, q: Quantity, least: float = 0.0) -> str:
-    curves = [Curve(axis, along, q.values[:, k]) for k, axis in enumerate("xyz")]
-    return figure(Plot(name, x, f"[{q.unit}]", curves, note="world axes", least=least))
+def _vectors(title: str, x: str, along: Array, found: _Quantities) -> Iterator[str]:
+    """A plot for each; those that are nothing beside the largest of their unit are named."""
+    if not found:
+        return
+    yield heading(title)
+    largest = {q.unit: max(_largest(one.values) for _, one in found if one.unit == q.unit) for _, q in found}
+    small: dict[str, list[str]] = {}
+    for name, q in found:
+        if _largest(q.values) <= _NOTHING * largest[q.unit]:
+            small.setdefault(q.unit, []).append(name)
+            continue
+        curves = [Curve(axis, along, q.values[:, k]) for k, axis in enumerate("xyz")]
+        what = "coordinate" if q.unit == "m" else name.rpartition(".")[2]
+        yield figure(Plot(name, x, f"{what} [{q.unit}]", curves, note="world axes"))
+    for unit, names in small.items():
+        least = _NOTHING * largest[unit]
+        bound = f"at most {least:.1g} {unit}, which is rounding" if least else f"0 {unit} all along"
+        yield paragraph(f"{', '.join(names)}: {bound}.", "note")
+
+
+def _largest(values: Array) -> float:
+    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _modes(run: ChainRun, times: Array) -> Iterator[str]:
@@ -223,11 +290,12 @@ def _modes(run: ChainRun, times: Array) -> Iterator[str]:
         for k, (share, kind, frequency) in enumerate(
             zip(shares, outputs.mode_kinds[link], outputs.mode_frequencies[link], strict=True), 1
         )
-        if share > 0
+        if share > _LEAST_SHARE
     ]
     if rows:
         yield heading("Modes")
-        yield paragraph("Share of each elastic mode in the elastic energy of its link, mean over time.", "note")
+        told = "Share of each elastic mode in the elastic energy of its link, mean over time"
+        yield paragraph(f"{told}; modes without a row take no part but rounding.", "note")
         yield table(("link", "mode", "frequency of the free link [Hz]", "kind", "share [%]"), rows)
 
 
@@ -241,5 +309,4 @@ def _solver(run: Run, repeat: Sequence[str]) -> Iterator[str]:
     rows = [(name, package_version(name)) for name in _PROGRAMS]
     yield table(("program", "version"), rows)
     settings = json.dumps(json.loads(msgspec.json.encode(run.scene.record)), indent=1)
-    yield paragraph("The scene, with all defaults:", "note")
-    yield code(settings)
+    yield folded("The scene, with all defaults", code(settings))

@@ -18,7 +18,7 @@ OPTIONS = {
     "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
                  "--resume", "--until", "--report", "--force", "--json"],
     "compare": ["--output", "-o", "--formulations", "--state", "--resume", "--set", "--workers", "--force", "--json"],
-    "study modes": ["--output", "-o", "--counts", "--frequencies", "--link", "--tolerance", "--load-tolerance",
+    "study modes": ["--output", "-o", "--counts", "--frequencies", "--ranked", "--link", "--tolerance", "--load-tolerance",
                     "--frequency-tolerance", "--beside", "--state", "--resume", "--set", "--workers", "--force",
                     "--json"],
     "study cost": ["--output", "-o", "--tolerance", "--formulations", "--modes", "--integrators", "--effects",
