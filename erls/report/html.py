@@ -85,10 +85,9 @@ def table(header: Sequence[str], rows: Sequence[Sequence[str]], explained: Seque
     """A table that scrolls by itself where the page is narrow; ``explained`` says what each column is."""
     told = list(explained) or [""] * len(header)
     texts = [not any(_NUMBER.match(row[k]) for row in rows) for k in range(len(header))]
-    sizes = [max((len(row[k]) for row in rows), default=0) for k in range(len(header))]
-    kinds = [  # columns without any number stand on the left, and long ones wrap
-        f' class="text{" long" if size > _LONG else ""}"' if text else "" for text, size in zip(texts, sizes, strict=True)
-    ]
+    long = [any(len(row[k]) > _LONG for row in rows) for k in range(len(header))]
+    text = {False: ' class="text"', True: ' class="text long"'}  # without any number on the left; long ones wrap
+    kinds = [text[wraps] if words else "" for words, wraps in zip(texts, long, strict=True)]
     titles = [f' title="{html.escape(text)}"' if text else "" for text in told]
     heads = [_UNIT.sub(lambda unit: unit[0].replace(" ", "\u00a0"), html.escape(text)) for text in header]
     head = "".join(f"<th{k}{t}>{c}</th>" for c, k, t in zip(heads, kinds, titles, strict=True))
@@ -193,7 +192,8 @@ def view(title: str, axis: str, unit: str, times: Array, shapes: Sequence[Shape]
 _CONTROLS = (
     '<div class="controls" id="@box@-controls"><button class="play" type="button">Play</button>'
     '<label>time <input type="range" min="0" value="0" step="1"><output></output></label>'
-    '<label>displacement <input type="range" min="0" max="3" value="0" step="0.05"><output></output></label>{shades}</div>'
+    '<label>displacement <input type="range" min="0" max="3" value="0" step="0.05"><output></output></label>'
+    "{shades}</div>"
 )
 _SHADES = "<label>colours <select><option>deflection</option><option>stress</option></select></label>"
 

@@ -259,11 +259,11 @@ def _distances(runs: Sequence[Point]) -> list[Plot]:
     last = runs[-1].outputs if runs else None
     plots = []
     for name, places in last.points.items() if last is not None else ():
-        curves = [
-            Curve(_counted(p), p.outputs.times, np.maximum(np.linalg.norm(p.outputs.points[name] - places, axis=1), _LEAST))
-            for p in runs[:-1]
-            if p.outputs is not None
-        ]
+        curves = []
+        for p in runs[:-1]:
+            if p.outputs is not None:
+                apart = np.linalg.norm(p.outputs.points[name] - places, axis=1)
+                curves.append(Curve(_counted(p), p.outputs.times, np.maximum(apart, _LEAST)))
         if curves:
             title = f"distance of {name} from where {_counted(runs[-1])} put it"
             plots.append(Plot(title, "t [s]", "distance [m]", curves, "y"))

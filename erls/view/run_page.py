@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Collection, Iterator, Sequence
-from typing import TYPE_CHECKING, TypeAlias
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from erls.auto.sizes import effect_forces
 from erls.maths.so3 import Array
+from erls.mechanism.effects import EFFECTS, in_order
 from erls.report.html import (
     Curve,
     Plot,
@@ -29,20 +31,19 @@ from erls.report.html import (
 from erls.report.runs import run_report
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run, plain
-from erls.run.tables import Quantity, quantities
+from erls.run.tables import quantities
 from erls.studies.outputs import run_outputs
 from erls.studies.spectrum import amplitude_spectrum, peaks
 from erls.view.figure import PartMesh
 from erls.view.figures import figure_of, holds_stress
+from erls.view.histories import histories
 from fe_import.files.versions import package_version
 
 if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
     from erls.run.bodies.rest import BodyPath
 
 _TIMES = 1001
-_NOTHING = 1e-9  # of the largest load of a kind: what rounding leaves
 _LEAST_SHARE = 1e-12
-_TWICE = ("angle", "coordinate")
 _PROGRAMS = ("erls", "numpy", "scipy", "numba", "h5py")
 _PARTS = {
     "integration": "steps and iterations, over the whole run",
@@ -51,15 +52,6 @@ _PARTS = {
     "links": "what links of small deformation leave out",
     "output": "interpolation between stored states",
 }
-_GROUPS = {
-    "angle": "Joint angles",
-    "coordinate": "Joint coordinates",
-    "rate": "Joint rates",
-    "effort": "Joint efforts",
-}
-
-
-_Quantities: TypeAlias = Sequence[tuple[str, Quantity]]
 
 
 def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
@@ -80,9 +72,10 @@ def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
 
         parts += _path(run) if isinstance(run, BodyPath) else ()
     sensors = {plain(sensor.name) for sensor in getattr(run, "sensors", ())}
-    parts += _histories(x, along.values, found, sensors)
-    if isinstance(run, ChainRun) and len(times) > 2:
-        parts += _modes(run, times)
+    parts += histories(x, along.values, found, sensors, getattr(run, "conservative", False))
+    if isinstance(run, ChainRun):
+        parts += _modes(run, times) if len(times) > 2 else ()
+        parts += _effects(run)
     parts += _solver(run, repeat)
     return page(run.title, parts)
 
@@ -109,6 +102,20 @@ def _verdict(run: Run) -> Iterator[str]:
 
 def _metres(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float | int) else "not judged"
+
+
+def _effects(run: ChainRun) -> Iterator[str]:
+    """What acts, and how strongly."""
+    sizes = effect_forces(run)
+    if not sizes:
+        return
+    yield heading("Effects")
+    told = "size: the largest generalized force that goes with it along the run, as one on all mass alike"
+    yield paragraph(f"{told}; `erls effects` says what leaving it out changes.", "note")
+    rows = [(name, f"{size:.3g}" if np.isfinite(size) else "-", EFFECTS[name].summary) for name, size in sizes.items()]
+    yield table(("effect", "size [N]", "what it is"), rows)
+    if left := in_order(EFFECTS.keys() - run.formulation.mechanism.effects):
+        yield paragraph(f"Left out: {', '.join(left)}.", "note")
 
 
 def _moving(run: Run) -> Iterator[str]:
@@ -197,79 +204,6 @@ def _carried(points: Array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64]
     chosen = list(dict.fromkeys(chosen))
     weights = np.linalg.lstsq(places[chosen].T, places.T, rcond=None)[0].T
     return nodes[chosen], weights
-
-
-def _histories(x: str, along: Array, found: _Quantities, sensors: Collection[str]) -> Iterator[str]:
-    """Plots of all columns: vectors by themselves, scalars of a kind together, and what sensors read."""
-    read = [one for one in found if one[0] in sensors or one[0].rpartition(".")[0] in sensors]
-    known = [one for one in found if one not in read]
-    vectors = [(name, q) for name, q in known if q.values.ndim == 2]
-    yield from _vectors("Places", x, along, [(name, q) for name, q in vectors if q.unit == "m"])
-    yield from _scalars(x, along, [(name, q) for name, q in known if q.values.ndim == 1])
-    yield from _vectors("Forces and moments", x, along, [(name, q) for name, q in vectors if q.unit != "m"])
-    if read:
-        yield heading("Sensors")
-    for name, q in read:
-        parts = [("", q.values)] if q.values.ndim == 1 else list(zip("xyz", q.values.T, strict=True))
-        yield figure(Plot(name, x, f"reading [{q.unit}]", [Curve(part, along, values) for part, values in parts]))
-
-
-def _scalars(x: str, along: Array, found: _Quantities) -> Iterator[str]:
-    """A plot for each kind and unit; angles that are the coordinates are not shown twice."""
-    grouped: dict[tuple[str, str], list[Curve]] = {}
-    for name, q in found:
-        base, _, last = name.rpartition(".")
-        kind = "Energy" if base == "energy" else _GROUPS.get(last, "Further readings")
-        label = last if kind == "Energy" else base if kind in _GROUPS.values() else name
-        grouped.setdefault((kind, q.unit), []).append(Curve(label, along, q.values))
-    angles, coordinates = ([c for (kind, _), own in grouped.items() if kind == _GROUPS[of] for c in own] for of in _TWICE)
-    same = _alike(angles, coordinates)
-    for kind in dict.fromkeys(kind for kind, _ in grouped):
-        if same and kind == _GROUPS["angle"]:
-            continue
-        yield heading(kind)
-        if same and kind == _GROUPS["coordinate"]:
-            yield paragraph("Joint angles are the same.", "note")
-        for (one, unit), curves in grouped.items():
-            if one != kind:
-                continue
-            if any(_largest(curve.y) > 0 for curve in curves):
-                yield figure(Plot("", x, f"{kind.lower()} [{unit}]", curves))
-            else:
-                yield paragraph(f"{', '.join(curve.label for curve in curves)}: 0 {unit} all along.", "note")
-
-
-def _alike(some: Sequence[Curve], others: Sequence[Curve]) -> bool:
-    """Whether curves of the same names are there, and the same but for rounding."""
-    known = {curve.label: curve.y for curve in others}
-    return len(some) == len(known) > 0 and all(
-        curve.label in known and np.allclose(curve.y, known[curve.label], rtol=1e-12, atol=1e-12, equal_nan=True)
-        for curve in some
-    )
-
-
-def _vectors(title: str, x: str, along: Array, found: _Quantities) -> Iterator[str]:
-    """A plot for each; those that are nothing beside the largest of their unit are named."""
-    if not found:
-        return
-    yield heading(title)
-    largest = {q.unit: max(_largest(one.values) for _, one in found if one.unit == q.unit) for _, q in found}
-    small: dict[str, list[str]] = {}
-    for name, q in found:
-        if _largest(q.values) <= _NOTHING * largest[q.unit]:
-            small.setdefault(q.unit, []).append(name)
-            continue
-        curves = [Curve(axis, along, q.values[:, k]) for k, axis in enumerate("xyz")]
-        what = "coordinate" if q.unit == "m" else name.rpartition(".")[2]
-        yield figure(Plot(name, x, f"{what} [{q.unit}]", curves, note="world axes"))
-    for unit, names in small.items():
-        least = _NOTHING * largest[unit]
-        bound = f"at most {least:.1g} {unit}, which is rounding" if least else f"0 {unit} all along"
-        yield paragraph(f"{', '.join(names)}: {bound}.", "note")
-
-
-def _largest(values: Array) -> float:
-    return float(np.abs(values[np.isfinite(values)]).max(initial=0.0))
 
 
 def _modes(run: ChainRun, times: Array) -> Iterator[str]:
