@@ -21,7 +21,7 @@ from PIL import Image
 
 import erls
 from erls.cli.main import main
-from erls.view.stress import chain_stress
+from erls.view.stress import chain_values
 
 CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
 pytestmark = [
@@ -237,7 +237,7 @@ def test_colours_show_stress_where_it_is_recovered(browser: Any, pages: dict[str
     scene, settings = PAGES["bracket"]
     run = erls.simulate(erls.load_scene(ROOT / scene, settings), verdict=False)
     times = "return JSON.parse(document.getElementById(document.querySelector('.view').id + '-data').textContent).times"
-    [found] = [own for own in chain_stress(run, browser.execute_script(times)) if own is not None]
+    [found] = [own for own in chain_values(run, browser.execute_script(times)) if own is not None]
     assert stress == pytest.approx(np.nanmax(found), rel=1e-4)  # hubs of holes hold none
     assert stress != most
     assert isinstance(other, str)  # the arm, one colour

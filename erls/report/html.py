@@ -27,8 +27,8 @@ _DIGITS = 7  # of numbers in plots
 _MOST_NUMBERS = 120_000  # of a view, times two
 _BOX = "@box@"  # for the name of what a part draws, which the page gives
 _NUMBER = re.compile(r"[-+]?[\d.]")  # what a cell with one begins with
-_UNIT = re.compile(r"\[[^\]]*\]")  # is not broken
-_LONG = 60  # characters of a cell that may have several lines
+_UNIT = re.compile(r"\[[^\]]{1,6}\]")  # is not broken
+_LONG = 25  # characters of a cell that may have several lines where the page is narrow
 _SHORT = 3  # sections from which on a page has a list of contents
 
 

@@ -34,9 +34,10 @@ from erls.run.record import Run, plain
 from erls.run.tables import quantities
 from erls.studies.outputs import run_outputs
 from erls.studies.spectrum import amplitude_spectrum, peaks
-from erls.view.figure import PartMesh
-from erls.view.figures import figure_of, holds_stress
+from erls.view.figure import STRESS, PartMesh
+from erls.view.figures import figure_of
 from erls.view.histories import histories
+from erls.view.stress import holds
 from fe_import.files.versions import package_version
 
 if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
@@ -120,7 +121,7 @@ def _effects(run: ChainRun) -> Iterator[str]:
 
 def _moving(run: Run) -> Iterator[str]:
     """The mechanism in space."""
-    drawn = figure_of(run, stress=holds_stress(run))
+    drawn = figure_of(run, color="stress" if holds(run, STRESS) else "deflection")
     first = drawn.poses([run.start])[0].meshes(0.0)
     kept = [_cells(mesh.cells, len(mesh.points)) for mesh in first]
     carried = [
@@ -150,7 +151,7 @@ def _moving(run: Run) -> Iterator[str]:
 
 def _stress(meshes: Sequence[PartMesh], nodes: NDArray[np.int64]) -> Array | None:
     """(f, n) at the nodes that are drawn; None of a part that tells none."""
-    told = [mesh.more.get("von_mises_MPa") for mesh in meshes]
+    told = [mesh.more.get(STRESS.array) for mesh in meshes]
     return None if any(one is None for one in told) else np.array([one[nodes] for one in told if one is not None])
 
 
@@ -178,6 +179,8 @@ def _cells(
     """Nodes that are drawn, and lines and triangles of these."""
     by_kind = {kind: np.asarray(found, dtype=int) for kind, found in cells}
     triangles, lines = (by_kind.get(kind, np.zeros((0, n), dtype=int)) for kind, n in (("triangle", 3), ("line", 2)))
+    if (quads := by_kind.get("quad")) is not None:
+        triangles = np.concatenate([triangles, quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     nodes = np.unique(np.concatenate([triangles.ravel(), lines.ravel()])) if len(triangles) or len(lines) else None
     if nodes is None:
         return np.arange(count), [], []

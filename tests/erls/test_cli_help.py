@@ -39,7 +39,7 @@ OPTIONS = {
     "examples copy": ["--json"],
     "schema": ["--output", "-o", "--force", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--stress", "--fps", "--speed", "--overlay", "--force",
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--color", "--fps", "--speed", "--overlay", "--force",
              "--json"],
 }
 
