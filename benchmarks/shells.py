@@ -233,7 +233,7 @@ def arm_stress() -> dict[str, Any]:
         changes = [f"simulation.duration={times[-1]}", f"simulation.formulation={name}"]
         changes += [f"simulation.step={step}"] if step else []
         run = erls.simulate(erls.load_scene(DATA / "shells/bracket_arm.toml", changes), verdict=False)
-        poses = figure_of(run, 1.0, stress=True).poses(times)
+        poses = figure_of(run, 1.0, "stress").poses(times)
         largest = [float(np.fmax.reduce(pose.values()[0])) for pose in poses]
         place = run.position("end", np.array(times))
         first = place if first is None else first

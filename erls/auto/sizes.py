@@ -14,7 +14,7 @@ from erls.auto.operations import Operations, operations
 from erls.auto.probe import Difference, coarse_run, difference, look_steps, needed, resolved
 from erls.equations.formulation import Formulation
 from erls.equations.quick import quick
-from erls.equations.registry import formulate
+from erls.equations.registry import TREES, formulate
 from erls.equations.substructures import solved
 from erls.errors import Cause, SimulationError
 from erls.mechanism.chain import Mechanism
@@ -100,6 +100,23 @@ def effect_sizes(scene: Scene, mechanism: Mechanism, names: Iterable[str]) -> tu
     return tuple(result)
 
 
+def effect_forces(run: ChainRun) -> dict[str, float]:
+    """Largest generalized force that goes with each effect along a run, as `EffectSize.force` [N].
+
+    Of those that it holds anything of; not a number where the equations cannot be solved without it, nothing of runs
+    whose equations have no such parts: beam elements, modes that follow statically.
+    """
+    mechanism, settings = run.formulation.mechanism, run.scene.record.simulation
+    if settings.formulation not in TREES or mechanism.bandwidth is not None or len(run.solution.t) < 2:
+        return {}
+
+    def force(name: str) -> float:
+        return _or_fails(lambda: _force(run, formulate(without(mechanism, {name}), settings)), np.nan)
+
+    there = present(mechanism)
+    return {name: force(name) for name in in_order(mechanism.effects) if name in there}
+
+
 def _size(
     scene: Scene, whole: ChainRun, less: Mechanism, faster: Mechanism, count: int
 ) -> tuple[Difference, float, float]:
@@ -126,7 +143,7 @@ def _reach(mechanism: Mechanism) -> float:
 
 
 def _force(whole: ChainRun, less: Formulation) -> float:
-    """Largest difference of generalized forces along the coarse run; without flexibility, what holds the modes.
+    """Largest difference of generalized forces along a run; without flexibility, what holds the modes.
 
     Forces F count as sqrt(μ Fᵀ M⁻¹ F) with the mass μ of all links: one that acts on all mass alike counts as it is,
     whatever the coordinates.

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-from cyclopts import Parameter
+from typing import TYPE_CHECKING
 
 from erls.cli.terminal import Force, Json, Output, Progress, print_json, report_times
 
 if TYPE_CHECKING:
     from erls.run.record import Run
-
-Stress = Annotated[bool, Parameter(name="--stress", negative="")]
-
 
 def info(file: Path, /, *, json: Json = False) -> None:
     """Show what is in a link, modal, scene or run file.
@@ -45,7 +40,7 @@ def view(
     at: str = "",
     mode: int | None = None,
     magnify: float = 1.0,
-    stress: Stress = False,
+    color: str = "deflection",
     fps: int = 30,
     speed: float = 1.0,
     overlay: Path | None = None,
@@ -70,9 +65,10 @@ def view(
         Show this vibration or buckling mode of bodies and beams, from 1 on, over the phase of its period (--at).
     magnify
         Factor on the displacement of the links, or of bodies and beams at rest; 1 shows it true.
-    stress
-        Colour by von Mises stress, of shells the largest over the thickness, rather than by deflection (pictures,
-        films, windows); point data of .pvd. Links need recovery maps, `[recovery]` of their descriptions.
+    color
+        What colours say (pictures, films, windows; point data of .pvd): deflection; stress, von Mises, of shells the
+        largest over the thickness; section-force or section-moment of beams. Links need `[recovery]` for all but the
+        first.
     fps
         Frames per second of a film.
     speed
@@ -97,7 +93,7 @@ def view(
     if overlay is not None:
         return _overlaid(loaded, run, overlay, output, force, json)
     if output is None:
-        show(loaded, stress=stress)
+        show(loaded, color=color)
         return
     claim(output, view_kind(output), [run], force)
     begun = time.perf_counter()
@@ -110,7 +106,7 @@ def view(
             magnification=magnify,
             fps=fps,
             speed=speed,
-            stress=stress,
+            color=color,
             progress=lambda done, total: advance(done, total),
         )
     if json:

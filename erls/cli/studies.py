@@ -34,6 +34,7 @@ def modes(
     output: Output = None,
     counts: str = "",
     frequencies: str = "",
+    ranked: Annotated[bool, Parameter(negative="")] = False,
     link: str = "",
     tolerance: float = 1e-4,
     load_tolerance: float = 0.02,
@@ -62,6 +63,8 @@ def modes(
         equal frequency are taken together.
     frequencies
         Instead: limits up to which the modes of each link are taken [Hz], separated by commas.
+    ranked
+        Count fixed-interface modes in the order in which the reduction of each link ranks them (selection = "ranking").
     link
         Vary the modes of this link only; of all links alike unless given.
     tolerance
@@ -85,17 +88,22 @@ def modes(
     json
         Print one JSON object.
     """
+    from erls.errors import Cause, SceneError
     from erls.report.mode_page import beside_summary, mode_study_page, mode_study_text, read_printed
     from erls.studies.mode_count import study_modes
     from erls.studies.mode_result import Tolerances, study_summary
 
     check_output(output, [scene], set_ or [], (".html", ".json"), force, [] if beside is None else [beside])
+    if ranked and beside is not None:
+        message, remedy = "published tables are of elastic modes, not of ranked ones", "leave one of the two out"
+        raise SceneError(Cause.BAD_FIELD, message, where="--beside", value=str(beside), remedy=remedy)
     printed = None if beside is None else read_printed(beside)
     with Progress("mode study") as advance:
         result = study_modes(
             scene,
             _counts(counts),
             frequencies=_limits(frequencies),
+            ranked=ranked,
             link=link,
             overrides=set_ or (),
             tolerances=Tolerances(tolerance, load_tolerance, frequency_tolerance),

@@ -13,6 +13,7 @@ from erls.report.tables import table
 from erls.studies.compare_result import Comparison, Distance, Pair
 from erls.studies.spectrum import amplitude_spectrum, peaks
 
+_LEAST = 1e-12  # m, shown of distances: less is rounding
 _HISTORIES = (
     ("points", "position", "m"),
     ("accelerations", "acceleration", "m/s2"),
@@ -122,11 +123,11 @@ def _peak_rows(comparison: Comparison) -> tuple[tuple[str, ...], list[tuple[str,
         for point, a in o.accelerations.items():
             for p in peaks(amplitude_spectrum(o.times, a)):
                 rows.append((point, name, f"{p.frequency:.3f}", f"{p.amplitude:.3g}"))
-    return ("point", "formulation", "frequency [Hz]", "amplitude [m/s2]"), sorted(rows)
+    return ("point", "formulation", "frequency [Hz]", "amplitude [m/s²]"), sorted(rows)
 
 
 def _plots(comparison: Comparison) -> list[Plot]:
-    """Coordinates in time with a magnification at the end, distances, accelerations in time and frequency."""
+    """Coordinates in time and their differences, distances, accelerations in time and frequency."""
     outputs = comparison.outputs
     if not outputs:
         return []
@@ -141,12 +142,15 @@ def _plots(comparison: Comparison) -> list[Plot]:
                 for k, (name, o) in enumerate(outputs.items())
             ]
             plots.append(Plot(f"{letter} coordinate of {point}", "t [s]", f"{letter} [m]", curves))
-            plots.append(_magnified(point, letter, curves))
+            if len(curves) > 1:
+                beside = [Curve(c.label, c.x, c.y - curves[0].y) for c in curves[1:]]
+                title = f"{letter} coordinate of {point}: how far from that of {curves[0].label}"
+                plots.append(Plot(title, "t [s]", f"difference in {letter} [m]", beside))
         apart = [
             Curve(
                 f"{p.a} - {p.b}",
                 first.times[1:],
-                np.linalg.norm(outputs[p.a].points[point] - outputs[p.b].points[point], axis=1)[1:],
+                np.maximum(np.linalg.norm(outputs[p.a].points[point] - outputs[p.b].points[point], axis=1)[1:], _LEAST),
             )
             for p in comparison.pairs
         ]
@@ -160,18 +164,6 @@ def _plots(comparison: Comparison) -> list[Plot]:
     return plots
 
 
-def _magnified(point: str, letter: str, curves: list[Curve]) -> Plot:
-    """A twentieth of the run around the time at which the curves lie furthest apart."""
-    values = np.array([c.y for c in curves])
-    middle = int(np.ptp(values, axis=0).argmax())
-    half = max(len(values[0]) // 40, 5)
-    window = slice(max(0, middle - half), middle + half + 1)
-    cut = [Curve(c.label, c.x[window], c.y[window], c.dashed) for c in curves]
-    return Plot(
-        f"{letter} coordinate of {point}, magnified where the curves lie furthest apart", "t [s]", f"{letter} [m]", cut
-    )
-
-
 def _acceleration_plots(comparison: Comparison, point: str) -> list[Plot]:
     times, lines = [], []
     for k, (name, o) in enumerate(comparison.outputs.items()):
@@ -180,6 +172,6 @@ def _acceleration_plots(comparison: Comparison, point: str) -> list[Plot]:
         s = amplitude_spectrum(o.times, a)
         lines.append(Curve(name, s.frequencies[1:], np.maximum(s.amplitudes[1:], 1e-12), dashed=k > 0))
     return [
-        Plot(f"acceleration of {point}", "t [s]", "acceleration [m/s2]", times),
-        Plot(f"spectrum of the acceleration of {point}", "frequency [Hz]", "amplitude [m/s2]", lines, logarithmic="xy"),
+        Plot(f"acceleration of {point}", "t [s]", "acceleration [m/s²]", times),
+        Plot(f"spectrum of the acceleration of {point}", "frequency [Hz]", "amplitude [m/s²]", lines, logarithmic="xy"),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from textwrap import fill
 
 import numpy as np
 
@@ -18,20 +19,26 @@ _HEADER = (
     *("setting", "accuracy", "time [s]", "error [m]", "warns of [m]", "steps", "right-hand sides", "factorizations"),
 )
 
+_SHORT = ("formulation, modes, integrator, effects", "accuracy", "time [s]", "error [m]", "warns of [m]", "steps")
+_WIDE = 100  # columns of a terminal
+
 
 def cost_text(study: CostStudy) -> str:
     """The front, what failed, and the recommendation, for the terminal."""
     parts = [
         f"{study.scene}: error against time, {len(study.runs)} settings",
-        _about_reference(study),
-        "Runs that no other one beats in both error and time\n" + table(_HEADER, [_row(r) for r in study.front]),
+        fill(_about_reference(study), _WIDE),
+        "Runs that no other one beats in both error and time\n" + table(_SHORT, [_short(r) for r in study.front]),
     ]
-    failed = _failed(study)
-    if failed:
-        rows = [(setting, accuracy, _short(cause)) for setting, accuracy, cause in failed]
-        parts.append("Failed\n" + table(("setting", "accuracy", "cause"), rows))
-    parts.append(recommendation(study) + ("" if study.complete else "; the study was interrupted"))
-    return "\n\n".join(parts)
+    causes: dict[str, list[str]] = {}
+    for r in study.runs:
+        if r.failure is not None:
+            causes.setdefault(str(r.failure), []).append(f"{_named(r)} ({_accuracy(r)})")
+    for cause, settings in causes.items():
+        listed = fill("; ".join(settings), _WIDE, initial_indent="  ", subsequent_indent="  ")
+        parts.append(f"{fill(f'Failed: {cause}', _WIDE)}\n{listed}")
+    ended = recommendation(study) + ("" if study.complete else "; the study was interrupted")
+    return "\n\n".join([*parts, fill(ended, _WIDE)])
 
 
 def cost_csv(study: CostStudy) -> str:
@@ -88,16 +95,24 @@ def _row(r: CostPoint) -> tuple[str, ...]:
     return (r.setting.name, _accuracy(r), f"{r.wall_s:.3g}", f"{r.error:.2e}", warned, *counts)
 
 
+def _named(r: CostPoint) -> str:
+    """The setting, as short as it can be told from others."""
+    s = r.setting
+    return f"{s.formulation}, {'all' if s.modes is None else s.modes}, {s.integrator}, {s.effects}"
+
+
+def _short(r: CostPoint) -> tuple[str, ...]:
+    """A row for a terminal."""
+    _, *figures = _row(r)
+    return (_named(r), *figures[: len(_SHORT) - 1])
+
+
 def _accuracy(r: CostPoint) -> str:
     return f"{r.setting.knob} {r.setting.value:.3g}"
 
 
 def _failed(study: CostStudy) -> list[tuple[str, str, str]]:
     return [(r.setting.name, _accuracy(r), str(r.failure)) for r in study.runs if r.failure is not None]
-
-
-def _short(text: str) -> str:
-    return text if len(text) <= 100 else text[:97] + "..."
 
 
 def _plot(study: CostStudy) -> Plot:

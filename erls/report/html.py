@@ -27,6 +27,8 @@ _DIGITS = 7  # of numbers in plots
 _MOST_NUMBERS = 120_000  # of a view, times two
 _BOX = "@box@"  # for the name of what a part draws, which the page gives
 _NUMBER = re.compile(r"[-+]?[\d.]")  # what a cell with one begins with
+_UNIT = re.compile(r"\[[^\]]{1,6}\]")  # is not broken
+_LONG = 25  # characters of a cell that may have several lines where the page is narrow
 _SHORT = 3  # sections from which on a page has a list of contents
 
 
@@ -44,9 +46,7 @@ class Curve:
 
 @dataclass(frozen=True)
 class Plot:
-    """A plot: curves over a common axis; ``logarithmic`` names the axes with a logarithmic scale (``x``, ``y``), and
-    values below ``least`` are not looked at more closely: a plot of nothing but rounding shows a straight line.
-    """
+    """A plot: curves over a common axis; ``logarithmic`` names the axes with a logarithmic scale (``x``, ``y``)."""
 
     title: str
     x_label: str
@@ -55,7 +55,6 @@ class Plot:
     logarithmic: str = ""
     limit: float | None = None
     note: str = ""
-    least: float = 0.0
 
 
 def paragraph(text: str, kind: str = "") -> str:
@@ -77,13 +76,21 @@ def code(text: str) -> str:
     return f"<pre>{html.escape(text)}</pre>"
 
 
+def folded(title: str, part: str) -> str:
+    """A part that is long and seldom read: shown when its title is clicked, and in print."""
+    return f"<details><summary>{html.escape(title)}</summary>{part}</details>"
+
+
 def table(header: Sequence[str], rows: Sequence[Sequence[str]], explained: Sequence[str] = ()) -> str:
     """A table that scrolls by itself where the page is narrow; ``explained`` says what each column is."""
     told = list(explained) or [""] * len(header)
     texts = [not any(_NUMBER.match(row[k]) for row in rows) for k in range(len(header))]
-    kinds = [' class="text"' if text else "" for text in texts]  # columns without any number stand on the left
+    long = [any(len(row[k]) > _LONG for row in rows) for k in range(len(header))]
+    text = {False: ' class="text"', True: ' class="text long"'}  # without any number on the left; long ones wrap
+    kinds = [text[wraps] if words else "" for words, wraps in zip(texts, long, strict=True)]
     titles = [f' title="{html.escape(text)}"' if text else "" for text in told]
-    head = "".join(f"<th{k}{t}>{html.escape(c)}</th>" for c, k, t in zip(header, kinds, titles, strict=True))
+    heads = [_UNIT.sub(lambda unit: unit[0].replace(" ", "\u00a0"), html.escape(text)) for text in header]
+    head = "".join(f"<th{k}{t}>{c}</th>" for c, k, t in zip(heads, kinds, titles, strict=True))
     body = "".join(
         "<tr>" + "".join(f"<td{k}>{html.escape(c)}</td>" for c, k in zip(row, kinds, strict=True)) + "</tr>"
         for row in rows
@@ -98,7 +105,6 @@ def figure(plot: Plot) -> str:
         "y": plot.y_label,
         "logarithmic": "".join(axis for axis in plot.logarithmic if _positive(plot, axis)),
         "limit": plot.limit,
-        "least": plot.least,
         "curves": [
             {
                 "label": curve.label,
@@ -136,6 +142,8 @@ class Shape:
     weights : (m, n) array, optional
         Lines and triangles are then over m corners, whose places and displacements are these weighted sums of those of
         the nodes: of a rigid surface with many corners, four nodes tell all frames.
+    stress : (f, n) array, optional
+        Von Mises [MPa]; not a number where it is not known.
     """
 
     name: str
@@ -144,6 +152,7 @@ class Shape:
     rest: Array
     moved: Array
     weights: Array | None = None
+    stress: Array | None = None
 
 
 def frames_of(nodes: int, most: int = 121) -> int:
@@ -170,20 +179,23 @@ def view(title: str, axis: str, unit: str, times: Array, shapes: Sequence[Shape]
             "triangles": shape.triangles,
             "rest": _packed(shape.rest),
             "moved": _packed(shape.moved),
-            **({} if shape.weights is None else {"weights": _packed(shape.weights)}),
+            **{name: _packed(values) for name in ("weights", "stress") if (values := getattr(shape, name)) is not None},
         }
         for shape in shapes
     ]
     told = {"axis": axis, "unit": unit, "times": _numbers(times), "parts": parts}
-    box = _box("view", told, "the mechanism in space", _CONTROLS)
+    shades = _SHADES if any(shape.stress is not None for shape in shapes) else ""
+    box = _box("view", told, "the mechanism in space", _CONTROLS.format(shades=shades))
     return f"<figure><figcaption>{html.escape(title)}</figcaption>{box}</figure>"
 
 
 _CONTROLS = (
     '<div class="controls" id="@box@-controls"><button class="play" type="button">Play</button>'
     '<label>time <input type="range" min="0" value="0" step="1"><output></output></label>'
-    '<label>displacement <input type="range" min="0" max="3" value="0" step="0.05"><output></output></label></div>'
+    '<label>displacement <input type="range" min="0" max="3" value="0" step="0.05"><output></output></label>'
+    "{shades}</div>"
 )
+_SHADES = "<label>colours <select><option>deflection</option><option>stress</option></select></label>"
 
 
 def _box(kind: str, told: dict[str, Any], label: str, controls: str = "") -> str:
@@ -225,7 +237,7 @@ def page(title: str, parts: Sequence[str]) -> str:
     """The whole document."""
     body = "\n".join(part.replace(_BOX, f"box-{number}") for number, part in enumerate(parts, 1))
     drawn = 'class="plot"' in body or 'class="view"' in body
-    scripts = [_asset("plotly-gl3d.min.js.gz")] if drawn else []
+    scripts = [_asset("canvas.js"), _asset("plotly-gl3d.min.js.gz")] if drawn else []
     scripts += [_asset("page.js")] if drawn or "<table>" in body else []
     return (
         f'<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8"><meta name="generator" content="{MARK}">'

@@ -14,6 +14,7 @@ from erls.report.html import table as html_table
 from erls.report.tables import table
 from erls.tracking.confirm import Confirmation
 
+_LEAST = 1e-12  # shown of what is missed: less is rounding
 _ZEROS = 6  # shown, of those above the real axis
 _HEAD = ("drive", "peak effort", "of rigid links", "unit")
 
@@ -84,10 +85,10 @@ def inversion_page(inversion: Inversion, elastic: Confirmation | None, rigid: Co
             Curve("elastic", inversion.t, effort),
             Curve("rigid links", inversion.t, inversion.rigid_efforts[name][: len(effort)], dashed=True),
         ]
-        parts.append(figure(Plot(name, "time [s]", f"effort [{units[name][1]}]", curves)))
+        parts.append(figure(Plot(name, "t [s]", f"effort [{units[name][1]}]", curves)))
     if inversion.deflection.any():
         curves = [Curve("largest", inversion.t, inversion.deflection)]
-        parts += [heading("Internal motion"), figure(Plot("Deflection", "time [s]", "[m]", curves))]
+        parts += [heading("Internal motion"), figure(Plot("Deflection", "t [s]", "deflection [m]", curves))]
     if elastic is not None:
         parts += [heading("What forward runs miss"), *_misses(inversion, elastic, rigid)]
     return page(f"{inversion.problem.scene.name}: inverse dynamics", parts)
@@ -97,8 +98,8 @@ def _misses(inversion: Inversion, elastic: Confirmation, rigid: Confirmation | N
     found = []
     for k, each in enumerate(inversion.problem.conditions.every):
         curves: list[Any] = [
-            Curve(name, run.t, np.maximum(np.abs(run.missed[:, k]), 1e-15), dashed=run is rigid)
+            Curve(name, run.t, np.maximum(np.abs(run.missed[:, k]), _LEAST), dashed=run is rigid)
             for name, run in _runs(elastic, rigid)
         ]
-        found.append(figure(Plot(each.name, "time [s]", f"[{each.unit}]", curves, "y")))
+        found.append(figure(Plot(each.name, "t [s]", f"missed by [{each.unit}]", curves, "y")))
     return found

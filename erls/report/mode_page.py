@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import csv
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import numpy as np
@@ -17,6 +19,8 @@ from erls.report.tables import table
 from erls.studies.mode_result import SUCCESSIVE, ModeStudy, Point
 
 _LARGEST_FILE = 1_000_000
+_LEAST = 1e-12  # m, shown of distances: less is rounding
+_WIDE = 100  # columns of a terminal
 _NAME = 16  # characters of what a terminal shows of a name
 _READING = "largest change of each figure over the run from the row above"
 _COLUMN = re.compile(r"joint .+|point .+ [xyz]")
@@ -137,8 +141,9 @@ def _figure(point: Point, column: str, time: float) -> str:
 
 def mode_study_text(study: ModeStudy, printed: Printed | None = None) -> str:
     """Changes from count to count, and the verdict, for the terminal."""
-    what = f"modes of link {study.link!r}" if study.link else "elastic modes, all links alike"
-    parts = [f"{study.scene}: {what}; {_READING}", table(*_short_rows(study)), verdict(study)]
+    what = f"{study.kind} of link {study.link!r}" if study.link else f"{study.kind}, all links alike"
+    told = f"{study.scene}: {what}; {_READING}: points [m], angles [rad], others relative; time [s]"
+    parts = [fill(told, _WIDE), table(*_short_rows(study)), fill(verdict(study), _WIDE)]
     if printed is not None:
         parts.append(f"Published figures at t = {printed.time:g} s: {printed.note}\n" + table(*beside(study, printed)))
     return "\n\n".join(parts)
@@ -149,10 +154,10 @@ def verdict(study: ModeStudy) -> str:
     t = study.tolerances
     limits = f"{t.position:g} m at points, {100 * t.load:g} % of peak loads, {100 * t.frequency:g} % of frequencies"
     if study.converged is not None:
-        return f"converged at {study.converged} elastic modes: {SUCCESSIVE} successive changes below {limits}"
+        return f"converged at {study.converged} {study.kind}: {SUCCESSIVE} successive changes below {limits}"
     text = f"NOT converged: there are no {SUCCESSIVE} successive changes below {limits}"
     if study.exhausted:
-        text = f"complete: all {study.points[-1].modes} elastic modes that there are have been taken"
+        text = f"complete: all {study.points[-1].modes} {study.kind} that there are have been taken"
     last = next((p for p in reversed(study.points) if p.changes), None)
     if last is not None and not last.unchanged:
         c = last.changes[0]
@@ -192,38 +197,38 @@ def _change_rows(study: ModeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...
         state = "" if not p.changes else "yes" if p.unchanged else "no"
         wall = f"{p.outputs.summary['wall_s']:.2f}"
         rows.append((str(p.modes), wall, *(values.get(n, "") for n in names), state))
-    return ("elastic modes", "time [s]", *(f"{n} [{units[n]}]" for n in names), "all within tolerance"), rows
+    return (study.kind, "time [s]", *(f"{n} [{units[n]}]" for n in names), "all within tolerance"), rows
 
 
 _SHORT = {
-    "point": "points [m]",
-    "angle": "angles [rad]",
-    "force": "forces",
-    "moment": "moments",
-    "effort": "efforts",
-    "section-force": "N, V",
-    "section-moment": "T, M",
-    "stress": "stress",
-    "spectrum": "peaks",
+    "points": ("point",),
+    "angles": ("angle",),
+    "forces": ("force",),
+    "moments": ("moment",),
+    "efforts": ("effort",),
+    "sections": ("section-force", "section-moment"),
+    "stress": ("stress",),
+    "peaks": ("spectrum",),
 }
-"""Heads of the largest changes of each kind; loads relative to their peaks, peaks of spectra to their frequency."""
+"""Heads of a terminal's table, and the kinds of which each shows the largest change."""
 
 
 def _short_rows(study: ModeStudy) -> tuple[tuple[str, ...], list[tuple[str, ...]]]:
-    """The largest change of each kind, and what changed most for its tolerance, within 100 columns of a terminal."""
-    kinds = [kind for kind in _SHORT if any(_of_kind(p, kind) for p in study.points)]
+    """The largest change of each kind, and what changed most for its tolerance, within `_WIDE` columns."""
+    heads = [head for head, kinds in _SHORT.items() if any(_of_kind(p, kinds) for p in study.points)]
+    name = min(_NAME, _WIDE - 20 - sum(2 + max(len(head), 7) for head in heads))
     rows = []
     for p in study.points:
         worst = p.changes[0].output if p.changes else "failed" if p.outputs is None else ""
-        worst = worst if len(worst) <= _NAME else f"{worst[: _NAME - 1]}…"
-        cells = [f"{max(found):.1e}" if (found := _of_kind(p, kind)) else "" for kind in kinds]
+        worst = worst if len(worst) <= name else f"{worst[: name - 1]}…"
+        cells = [f"{max(found):.1e}" if (found := _of_kind(p, _SHORT[head])) else "" for head in heads]
         wall = "" if p.outputs is None else f"{p.outputs.summary['wall_s']:.2f}"
         rows.append((str(p.modes), wall, *cells, worst, "" if not p.changes else "yes" if p.unchanged else "no"))
-    return ("modes", "time", *(_SHORT[kind] for kind in kinds), "worst", "ok"), rows
+    return ("modes", "time", *heads, "worst", "ok"), rows
 
 
-def _of_kind(point: Point, kind: str) -> list[float]:
-    return [change.value for change in point.changes if change.output.split()[0] == kind]
+def _of_kind(point: Point, kinds: Sequence[str]) -> list[float]:
+    return [change.value for change in point.changes if change.output.split()[0] in kinds]
 
 
 def _plots(study: ModeStudy) -> list[Plot]:
@@ -244,14 +249,26 @@ def _plots(study: ModeStudy) -> list[Plot]:
             limit = study.tolerances.position if kind == "point" else None
             limit = study.tolerances.load if unit == "of peak" else limit
             plots.append(
-                Plot(f"change of {kind} from the count before", "elastic modes", f"change [{unit}]", curves, "y", limit)
+                Plot(f"change of {kind} from the count before", study.kind, f"change [{unit}]", curves, "y", limit)
             )
-    runs = [p for p in study.points if p.outputs is not None]
-    for name in runs[0].outputs.points if runs and runs[0].outputs is not None else ():
-        curves = [
-            Curve(f"{p.modes} modes", p.outputs.times, p.outputs.points[name][:, 2], dashed=k % 2 == 1)
-            for k, p in enumerate(runs)
-            if p.outputs is not None
-        ]
-        plots.append(Plot(f"z coordinate of {name} against mode count", "t [s]", "z [m]", curves))
+    return [*plots, *_distances([p for p in study.points if p.outputs is not None])]
+
+
+def _distances(runs: Sequence[Point]) -> list[Plot]:
+    """Of every point, over time, from where most modes put it."""
+    last = runs[-1].outputs if runs else None
+    plots = []
+    for name, places in last.points.items() if last is not None else ():
+        curves = []
+        for p in runs[:-1]:
+            if p.outputs is not None:
+                apart = np.linalg.norm(p.outputs.points[name] - places, axis=1)
+                curves.append(Curve(_counted(p), p.outputs.times, np.maximum(apart, _LEAST)))
+        if curves:
+            title = f"distance of {name} from where {_counted(runs[-1])} put it"
+            plots.append(Plot(title, "t [s]", "distance [m]", curves, "y"))
     return plots
+
+
+def _counted(point: Point) -> str:
+    return "1 mode" if point.modes == 1 else f"{point.modes} modes"

@@ -3,21 +3,22 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from erls.equations.formulation import Formulation
-from erls.equations.nodal.scenes.build import assemble
 from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import formulate
 from erls.integrate.base import Solution
 from erls.mechanism.effects import Certificate
 from erls.run.accuracy import Accuracy, Trust
-from erls.run.bodies.run import BodyRun
 from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.scene.build import build_mechanism
 from erls.scene.chain import Scene
 from erls.simulation.chains import build_like
+
+if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
+    from erls.run.bodies.run import BodyRun
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,11 @@ Packed = PackedRun | PackedBodies
 
 def packed(run: Run) -> Packed:
     """A run to be sent."""
-    if isinstance(run, BodyRun):
+    if not isinstance(run, ChainRun):
+        from erls.run.bodies.run import BodyRun  # here: it imports nodal elements, which chains do not need
+
+        assert isinstance(run, BodyRun)
         return PackedBodies(type(run), {f.name: getattr(run, f.name) for f in fields(run) if f.name != "assembly"})
-    assert isinstance(run, ChainRun)
     s = run.solution
     if isinstance(run.formulation, QuasiStatic):
         y, v, a = (run.formulation.stored(values) for values in (s.y, s.v, s.a))
@@ -65,6 +68,8 @@ def packed(run: Run) -> Packed:
 
 def unpacked_bodies(run: PackedBodies) -> BodyRun:
     """A run of bodies that was sent."""
+    from erls.equations.nodal.scenes.build import assemble  # here: it imports nodal elements, which chains do not need
+
     return run.kind(assembly=assemble(run.values["scene"]), **run.values)
 
 

@@ -9,7 +9,6 @@ from typing import Any, TypeAlias
 
 import msgspec
 
-from erls.equations.nodal.scenes.build import assemble
 from erls.equations.registry import formulate
 from erls.errors import SceneError
 from erls.integrate.choice import compile_kernels, compiled_steps, compiling_steps
@@ -113,6 +112,8 @@ class Variants:
         """Read and compile what a variant needs."""
         scene = self.scene(overrides)
         if isinstance(scene, BodyScene):
+            from erls.equations.nodal.scenes.build import assemble  # here: chains need no nodal elements
+
             assemble(scene)
             return
         if led_by_inversion(scene.record):

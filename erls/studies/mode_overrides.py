@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 
+from erls.errors import Cause, SceneError
 from erls.maths.so3 import Array
 from erls.scene.chain import Scene
 from fe_import.description.link import load_link
-from fe_import.description.reduction import Reduction
+from fe_import.description.reduction import Ranking, Reduction
 from fe_import.modal.equal_frequencies import whole_count
 
 
@@ -46,6 +48,30 @@ def count_field(scene: Scene, name: str) -> str:
         if options.truncation != Reduction().truncation or options.static_correction:
             return f"links.{name}.reduction.elastic_modes"
     return f"links.{name}.elastic_modes"
+
+
+def rankings(scene: Scene) -> dict[str, Ranking]:
+    """What fixed-interface modes are ranked for, of each link whose reduction ranks them.
+
+    Raises
+    ------
+    SceneError
+        BAD_FIELD: there is none.
+    """
+    links = [link for link in scene.record.links if link.model]
+    found = {link.name: load_link(scene.folder / link.model, link.reduction).description.reduction for link in links}
+    ranked = {name: of.ranking for name, of in found.items() if of.ranking is not None}
+    if not ranked:
+        message, where = "no link of this scene ranks its fixed-interface modes", str(scene.path)
+        remedy = 'give the reduction of a link selection = "ranking", and what they are ranked for'
+        raise SceneError(Cause.BAD_FIELD, message, where=where, remedy=remedy)
+    return ranked
+
+
+def ranked_setting(name: str, ranking: Ranking, count: int) -> str:
+    """``KEY=VALUE`` that takes this many modes of a ranking."""
+    told = ", ".join(f"{field} = {json.dumps(getattr(ranking, field))}" for field in ("driving", "observed"))
+    return f"links.{name}.reduction.ranking={{{told}, count = {count}}}"
 
 
 def default_counts(most: int) -> list[int]:

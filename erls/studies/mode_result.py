@@ -103,7 +103,9 @@ class ModeStudy:
     complete : bool
         False after an interrupt.
     available : dict of str to int
-        Elastic modes that there are of each link.
+        Modes that there are of each link.
+    ranked : bool
+        Whether modes are fixed-interface ones in the order of a ranking, rather than elastic ones.
     """
 
     scene: str
@@ -114,6 +116,12 @@ class ModeStudy:
     remaining: tuple[tuple[str, float], ...]
     complete: bool
     available: Mapping[str, int]
+    ranked: bool = False
+
+    @property
+    def kind(self) -> str:
+        """What is counted."""
+        return "ranked fixed-interface modes" if self.ranked else "elastic modes"
 
     @property
     def exhausted(self) -> bool:
@@ -173,13 +181,13 @@ def converged_at(points: Sequence[Point]) -> int | None:
 
 def remaining_kinds(points: Sequence[Point]) -> tuple[tuple[str, float], ...]:
     """Kinds of the modes that the last step added and their share of the elastic energy, largest first."""
-    done = [p for p in points if p.outputs is not None]
-    if len(done) < 2 or done[-1].outputs is None:
+    done = [p.outputs for p in points if p.outputs is not None]
+    if len(done) < 2:
         return ()
     shares: dict[str, float] = {}
-    last = done[-1].outputs
+    before_last, last = done[-2:]
     for name, energy in last.mode_energy.items():
-        before = done[-2].counts.get(name, len(energy))
+        before = len(before_last.mode_energy.get(name, ()))
         for kind, share in list(zip(last.mode_kinds[name], energy, strict=True))[before:]:
             shares[kind] = shares.get(kind, 0.0) + float(share)
     return tuple(sorted(shares.items(), key=lambda item: -item[1]))
@@ -202,7 +210,7 @@ def study_summary(study: ModeStudy) -> dict[str, Any]:
         "all_modes_taken": study.exhausted,
         "points": [
             {
-                "elastic_modes": p.modes,
+                "ranked_modes" if study.ranked else "elastic_modes": p.modes,
                 "by_link": dict(p.counts),
                 "wall_s": None if p.outputs is None else p.outputs.summary["wall_s"],
                 "error": None if p.error is None else p.error.as_dict(),

@@ -39,7 +39,7 @@ def picture(
     times: Sequence[float] | None = None,
     magnification: float = 1.0,
     size: Size = (1280, 800),
-    stress: bool = False,
+    color: str = "deflection",
 ) -> None:
     """Draw a run: the mechanism at several times, the last one solid, with the paths of its points.
 
@@ -54,8 +54,8 @@ def picture(
         Of the displacement against the Equivalent Rigid Link System, at rest against where all is built; 1 is true.
     size : (width, height)
         [pixel]
-    stress : bool
-        Colours say von Mises stress, of shells the largest over the thickness, rather than deflection.
+    color : str
+        What colours say: a key of `erls.view.figure.SHADES`.
 
     Raises
     ------
@@ -66,7 +66,7 @@ def picture(
     """
     check(magnification, size, path, PICTURES)
     with replacing(path) as temporary:
-        image = _picture(run, times, magnification, size, stress)
+        image = _picture(run, times, magnification, size, color)
         if temporary.suffix.lower() == ".png":
             image.save(temporary, optimize=True, pnginfo=_remark())
         else:
@@ -81,8 +81,8 @@ def _remark() -> PngInfo:
     return remark
 
 
-def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size, stress: bool) -> Image:
-    figure = figure_of(run, magnification, stress)
+def _picture(run: Run, times: Sequence[float] | None, magnification: float, size: Size, color: str) -> Image:
+    figure = figure_of(run, magnification, color)
     poses = figure.poses(run.spread(_INSTANTS) if times is None or not len(times) else times)
     motion = surveyed(figure, magnification, poses)
     *earlier, last = poses
@@ -106,7 +106,7 @@ def _picture(run: Run, times: Sequence[float] | None, magnification: float, size
     return sheet.image
 
 
-def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800), stress: bool = False) -> None:
+def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800), color: str = "deflection") -> None:
     """Open a window that can be turned, with a slider for time; returns when it is closed.
 
     Raises
@@ -117,7 +117,7 @@ def show(run: Run, magnification: float = 1.0, size: Size = (1280, 800), stress:
     check(magnification, size)
     if sys.platform.startswith("linux") and not os.environ.get("DISPLAY"):
         raise no_picture("there is no display for a window")
-    figure = figure_of(run, magnification, stress)
+    figure = figure_of(run, magnification, color)
     motion = surveyed(figure, magnification, None)
     with drawing(), Window(figure, motion, magnification, size) as window:
         if window.hidden:
@@ -150,7 +150,7 @@ def write_view(
     speed: float = 1.0,
     progress: Progress | None = None,
     repeat: Sequence[str] = (),
-    stress: bool = False,
+    color: str = "deflection",
 ) -> None:
     """Write a picture (.png, .jpg), film (.mp4, .gif), report (.html), export for ParaView (.pvd) or table (.csv).
 
@@ -169,9 +169,9 @@ def write_view(
         Told how much is done, and the total.
     repeat : sequence of str
         Words of the command that made the run, for a report.
-    stress : bool
-        Colours of pictures and films say von Mises stress, of shells the largest over the thickness, rather than
-        deflection; an export has it beside. Not for tables and reports.
+    color : str
+        What colours of pictures and films say: ``deflection``; ``stress``, von Mises, of shells the largest over the
+        thickness; ``section-force``, ``section-moment`` of beams. An export has it beside. Not for tables and reports.
 
     Raises
     ------
@@ -185,14 +185,14 @@ def write_view(
     if suffix in FILMS:
         if times is not None and len(times):
             raise bad("times", "a film shows the whole run", list(times), None, "leave the times out, or make a .png")
-        film(run, path, magnification, fps, speed, progress=progress, stress=stress)
+        film(run, path, magnification, fps, speed, progress=progress, color=color)
     elif suffix in PICTURES:
-        picture(run, path, times, magnification, stress=stress)
+        picture(run, path, times, magnification, color=color)
     elif suffix == ".pvd":
-        export_paraview(run, path, times, magnification, progress, stress)
-    elif stress:
+        export_paraview(run, path, times, magnification, progress, color)
+    elif color != "deflection":
         remedy = "make a picture (.png, .jpg), a film (.mp4, .gif) or an export (.pvd)"
-        raise bad("stress", "tables and reports do not show it", suffix, None, remedy)
+        raise bad("color", "tables and reports do not show it", suffix, None, remedy)
     elif magnification != 1.0:
         what = "a table holds" if suffix == ".csv" else "a report has a slider for it and shows"
         raise bad("magnification", f"{what} true values", magnification, None, "leave it at 1")

@@ -22,7 +22,7 @@ from erls.run.bodies.run import BodyRun
 from erls.scene.bodies.schema import GROUND as GROUND_NAME
 from erls.scene.bodies.schema import Body, LineSpring
 from erls.view.body_shapes import body_surface, ellipsoid, facing, spring_surface
-from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
+from erls.view.figure import DEFLECTION, STRESS, Figure, Part, PartMesh, Pose, Shade
 from erls.view.shapes import JointPlace, ground_surface, joints_surface, part_surface, polylines, thick
 from erls.view.stress import largest, surface_stress
 from fe_import.model import IntArray
@@ -240,7 +240,7 @@ class BodyPose(Pose):
             found.append(PartMesh(name, shown[nodes], cells, (true - built)[nodes]))
         stress = [] if self.figure.shade is DEFLECTION else [largest(own.at(self.poses)) for own in self.figure.stress]
         for k, (name, surface) in enumerate(assembly.shells.items()):
-            at, more = surface.nodes, {"von_mises_MPa": stress[k]} if stress else {}
+            at, more = surface.nodes, {STRESS.array: stress[k]} if stress else {}
             found.append(PartMesh(name, shown[at], [("quad", surface.cells)], (true - built)[at], more))
         for body in self.figure.run.scene.record.bodies:
             node = [assembly.numbers[body.name]]

@@ -20,7 +20,7 @@ from erls.run.chain.places import node_positions, rigid_frames, rigid_positions,
 from erls.run.chain.run import ChainRun
 from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
 from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines, thick
-from erls.view.stress import chain_stress
+from erls.view.stress import chain_values
 from fe_import.model import IntArray
 
 
@@ -61,9 +61,9 @@ class ChainFigure(Figure):
         mechanism, states = self.run.formulation.mechanism, self.run.states(list(times))
         if self.shade is DEFLECTION:
             return [ChainPose(state.time, mechanism, state) for state in states]
-        stress = chain_stress(self.run, times)
-        each = [[None if own is None else own[k] for own in stress] for k in range(len(states))]
-        return [ChainPose(at.time, mechanism, at, own) for at, own in zip(states, each, strict=True)]
+        found = chain_values(self.run, times, self.shade)
+        each = [[None if own is None else own[k] for own in found] for k in range(len(states))]
+        return [ChainPose(at.time, mechanism, at, self.shade, own) for at, own in zip(states, each, strict=True)]
 
     def paths(self, times: Array, magnification: float) -> list[Array]:
         """All times at once."""
@@ -74,12 +74,13 @@ class ChainFigure(Figure):
 
 @dataclass(frozen=True)
 class ChainPose(Pose):
-    """A chain in a state, with the stress at the nodes of its links where colours say that, None of those without."""
+    """A chain in a state, with what colours say at the nodes of its links, None of those without."""
 
     time: float
     mechanism: Mechanism
     state: State
-    stress: list[Array | None] | None = None
+    shade: Shade = DEFLECTION
+    held: list[Array | None] | None = None
 
     def points(self, magnification: float) -> list[Array]:
         """(3,) places of the named points."""
@@ -95,9 +96,9 @@ class ChainPose(Pose):
 
     def values(self) -> list[Array]:
         """(n,) of each link's nodes."""
-        if self.stress is None:
+        if self.held is None:
             return super().values()
-        every = [(self.stress[k], len(_corners(self.mechanism.links[k]))) for k in self.mechanism.bodies]
+        every = [(self.held[k], len(_corners(self.mechanism.links[k]))) for k in self.mechanism.bodies]
         return [np.full(count, np.nan) if own is None else own for own, count in every]
 
     @property
@@ -146,8 +147,8 @@ class ChainPose(Pose):
         found = []
         for k, places in zip(self.mechanism.bodies, self.nodes(magnification), strict=True):
             link = self.mechanism.links[k]
-            stress = None if self.stress is None else self.stress[k]
-            more = {} if stress is None else {"von_mises_MPa": stress}
+            held = None if self.held is None else self.held[k]
+            more = {} if held is None else {self.shade.array: held}
             triangles, lines = _cells(link)
             cells = [(kind, c) for kind, c in (("line", lines), ("triangle", triangles)) if len(c)]
             cells = cells or [("vertex", np.arange(len(places))[:, None])]

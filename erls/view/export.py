@@ -33,7 +33,7 @@ def export_paraview(
     times: Sequence[float] | None = None,
     magnification: float = 1.0,
     progress: Progress | None = None,
-    stress: bool = False,
+    color: str = "deflection",
 ) -> None:
     """Write the deformed links, or beams and bodies: NAME.pvd and a folder NAME_files with a .vtu for each time and
     link.
@@ -53,8 +53,8 @@ def export_paraview(
         Of the displacement in the points; 1 is true.
     progress : callable, optional
         Told the times done and their total.
-    stress : bool
-        Whether von Mises stress is point data, too, of shells the largest over the thickness.
+    color : str
+        A key of `erls.view.figure.SHADES` that is point data, too.
 
     Raises
     ------
@@ -68,7 +68,7 @@ def export_paraview(
     target = check_writable(path)
     folder = target.with_name(f"{target.stem}_files")
     _check_replaceable(folder)
-    figure = figure_of(run, magnification, stress)
+    figure = figure_of(run, magnification, color)
     poses = figure.poses(_times(run, times, _PARAVIEW_TIMES))
     root = ET.Element("VTKFile", type="Collection", version="1.0", byte_order="LittleEndian")
     root.append(ET.Comment(f" {MARK} "))

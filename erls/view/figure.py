@@ -18,14 +18,30 @@ from erls.run.record import Run
 
 @dataclass(frozen=True)
 class Shade:
-    """What colours say: its name, its unit, and whether any of it is worth a colour."""
+    """What colours say.
+
+    Attributes
+    ----------
+    name, unit : str
+    array : str
+        Point data of exports that hold it.
+    always : bool
+        Whether any of it is worth a colour.
+    """
 
     name: str
     unit: str
+    array: str = ""
     always: bool = False
 
 
-DEFLECTION, STRESS = Shade("deflection", "mm"), Shade("stress", "MPa", True)
+DEFLECTION, STRESS = Shade("deflection", "mm"), Shade("stress", "MPa", "von_mises_MPa", True)
+FORCE, MOMENT = (
+    Shade("section force", "N", "section_force_N", True),
+    Shade("section moment", "N m", "section_moment_Nm", True),
+)
+SHADES = {"deflection": DEFLECTION, "stress": STRESS, "section-force": FORCE, "section-moment": MOMENT}
+"""By the names that ``--color`` takes."""
 
 
 @dataclass(frozen=True)

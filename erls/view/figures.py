@@ -10,24 +10,25 @@ from erls.run.chain.run import ChainRun
 from erls.run.record import Run
 from erls.view.bodies import BodyFigure
 from erls.view.chain import ChainFigure
-from erls.view.figure import DEFLECTION, STRESS, Figure
-from erls.view.stress import no_stress
+from erls.view.figure import DEFLECTION, SHADES, Figure
+from erls.view.stress import holds, holds_none
+from fe_import.files.toml import choose
 
 
-def figure_of(run: Run, magnification: float = 1.0, stress: bool = False) -> Figure:
-    """What is drawn of a run; ``stress`` says that colours do, rather than deflection.
+def figure_of(run: Run, magnification: float = 1.0, color: str = "deflection") -> Figure:
+    """What is drawn of a run; ``color`` says what colours do: a key of `erls.view.figure.SHADES`.
 
     Raises
     ------
     SceneError
-        BAD_FIELD: a magnification where there is nothing that displacements count from; nothing was computed; stress
-        where nothing holds any, or of modes, whose amplitude means nothing.
+        BAD_FIELD: a magnification where there is nothing that displacements count from; nothing was computed; a colour
+        that nothing holds, or stress of modes, whose amplitude means nothing; BAD_REFERENCE: no such colour.
     """
-    shade = STRESS if stress else DEFLECTION
+    choose(color, SHADES, "color", SceneError)
+    shade = SHADES[color]
     if isinstance(run, ChainRun):
-        links = [run.formulation.mechanism.links[k].model for k in run.formulation.mechanism.bodies]
-        if stress and not any(m.recovery is not None and m.recovery.quantity == "stress" for m in links):
-            raise no_stress(run)
+        if not holds(run, shade):
+            raise holds_none(run, shade)
         return ChainFigure(run, shade)
     assert isinstance(run, BodyRun)
     if not len(run.times):
@@ -36,9 +37,9 @@ def figure_of(run: Run, magnification: float = 1.0, stress: bool = False) -> Fig
     if magnification != 1.0 and isinstance(run, BodyMotion):
         message, remedy = "bodies and beams that move have no displacement to magnify", "leave it at 1"
         raise SceneError(Cause.BAD_FIELD, message, where="magnification", value=magnification, remedy=remedy)
-    if stress and isinstance(run, BodyMode):
-        message, remedy = "modes have no scale, and their stress neither", "leave stress out"
-        raise SceneError(Cause.BAD_FIELD, message, where="stress", value=run.title, remedy=remedy)
-    if stress and not run.assembly.shells:
-        raise no_stress(run)
+    if shade is not DEFLECTION and isinstance(run, BodyMode):
+        message, remedy = "modes have no scale, and their stress neither", "leave the colour at deflection"
+        raise SceneError(Cause.BAD_FIELD, message, where="color", value=run.title, remedy=remedy)
+    if not holds(run, shade):
+        raise holds_none(run, shade)
     return BodyFigure(run, shade)

@@ -46,7 +46,7 @@ def film(
     speed: float = 1.0,
     size: Size = (1280, 800),
     progress: Progress | None = None,
-    stress: bool = False,
+    color: str = "deflection",
 ) -> None:
     """Film a run from a fixed place.
 
@@ -65,8 +65,8 @@ def film(
         [pixel], rounded down to even numbers.
     progress : callable, optional
         Told the frames done and their total.
-    stress : bool
-        Colours say von Mises stress, of shells the largest over the thickness, rather than deflection.
+    color : str
+        What colours say: a key of `erls.view.figure.SHADES`.
 
     Raises
     ------
@@ -79,7 +79,7 @@ def film(
     times = _frame_times(run, fps, speed, 50 if Path(path).suffix.lower() == ".gif" else 240)
     size = (size[0] - size[0] % 2, size[1] - size[1] % 2)
     with replacing(path) as temporary:
-        figure = figure_of(run, magnification, stress)
+        figure = figure_of(run, magnification, color)
         motion = surveyed(figure, magnification, None)
         with drawing(), Stage(figure, motion, magnification, size) as stage, FilmWriter(temporary, size, fps) as writer:
             sides: dict[str, int] = {}

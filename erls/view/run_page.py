@@ -11,22 +11,40 @@ import msgspec
 import numpy as np
 from numpy.typing import NDArray
 
+from erls.auto.sizes import effect_forces
 from erls.maths.so3 import Array
-from erls.report.html import Curve, Plot, Shape, code, figure, frames_of, heading, page, paragraph, table, view
+from erls.mechanism.effects import EFFECTS, in_order
+from erls.report.html import (
+    Curve,
+    Plot,
+    Shape,
+    code,
+    figure,
+    folded,
+    frames_of,
+    heading,
+    page,
+    paragraph,
+    table,
+    view,
+)
 from erls.report.runs import run_report
 from erls.run.chain.run import ChainRun
-from erls.run.record import Run
-from erls.run.tables import Quantity, quantities
+from erls.run.record import Run, plain
+from erls.run.tables import quantities
 from erls.studies.outputs import run_outputs
 from erls.studies.spectrum import amplitude_spectrum, peaks
+from erls.view.figure import STRESS, PartMesh
 from erls.view.figures import figure_of
+from erls.view.histories import histories
+from erls.view.stress import holds
 from fe_import.files.versions import package_version
 
 if TYPE_CHECKING:  # it imports nodal elements, which chains do not need
     from erls.run.bodies.rest import BodyPath
 
 _TIMES = 1001
-_NOTHING = 1e-9  # of the largest load of a kind: what rounding leaves
+_LEAST_SHARE = 1e-12
 _PROGRAMS = ("erls", "numpy", "scipy", "numba", "h5py")
 _PARTS = {
     "integration": "steps and iterations, over the whole run",
@@ -34,12 +52,6 @@ _PARTS = {
     "effects": "physical effects that are left out",
     "links": "what links of small deformation leave out",
     "output": "interpolation between stored states",
-}
-_GROUPS = {
-    "angle": "Joint angles",
-    "coordinate": "Joint coordinates",
-    "rate": "Joint rates",
-    "effort": "Joint efforts",
 }
 
 
@@ -60,9 +72,11 @@ def run_page(run: Run, repeat: Sequence[str] = ()) -> str:
         from erls.run.bodies.rest import BodyPath
 
         parts += _path(run) if isinstance(run, BodyPath) else ()
-    parts += _histories(x, along.values, found)
-    if isinstance(run, ChainRun) and len(times) > 2:
-        parts += _modes(run, times)
+    sensors = {plain(sensor.name) for sensor in getattr(run, "sensors", ())}
+    parts += histories(x, along.values, found, sensors, getattr(run, "conservative", False))
+    if isinstance(run, ChainRun):
+        parts += _modes(run, times) if len(times) > 2 else ()
+        parts += _effects(run)
     parts += _solver(run, repeat)
     return page(run.title, parts)
 
@@ -91,9 +105,23 @@ def _metres(value: object) -> str:
     return f"{value:.3g}" if isinstance(value, float | int) else "not judged"
 
 
+def _effects(run: ChainRun) -> Iterator[str]:
+    """What acts, and how strongly."""
+    sizes = effect_forces(run)
+    if not sizes:
+        return
+    yield heading("Effects")
+    told = "size: the largest generalized force that goes with it along the run, as one on all mass alike"
+    yield paragraph(f"{told}; `erls effects` says what leaving it out changes.", "note")
+    rows = [(name, f"{size:.3g}" if np.isfinite(size) else "-", EFFECTS[name].summary) for name, size in sizes.items()]
+    yield table(("effect", "size [N]", "what it is"), rows)
+    if left := in_order(EFFECTS.keys() - run.formulation.mechanism.effects):
+        yield paragraph(f"Left out: {', '.join(left)}.", "note")
+
+
 def _moving(run: Run) -> Iterator[str]:
     """The mechanism in space."""
-    drawn = figure_of(run)
+    drawn = figure_of(run, color="stress" if holds(run, STRESS) else "deflection")
     first = drawn.poses([run.start])[0].meshes(0.0)
     kept = [_cells(mesh.cells, len(mesh.points)) for mesh in first]
     carried = [
@@ -102,6 +130,7 @@ def _moving(run: Run) -> Iterator[str]:
     ]
     times = run.spread(frames_of(sum(len(nodes) for nodes, _ in carried)))
     poses = [pose.meshes(0.0) for pose in drawn.poses(times)]
+    stress = [_stress([pose[k] for pose in poses], nodes) for k, (nodes, _, _) in enumerate(kept)]
     shapes = [
         Shape(
             mesh.name,
@@ -110,12 +139,20 @@ def _moving(run: Run) -> Iterator[str]:
             np.array([pose[k].points[nodes] for pose in poses]),
             np.array([pose[k].displacement[nodes] for pose in poses]),
             weights,
+            stress[k],
         )
         for k, (mesh, (_, lines, triangles), (nodes, weights)) in enumerate(zip(first, kept, carried, strict=True))
     ]
     yield heading("Motion" if run.axis.unit == "s" else "Path")
-    title = "Turn it by dragging; colours show how far links are bent"
+    colours = "how far links are bent" if all(one is None for one in stress) else "how far links are bent, or stress"
+    title = f"Turn it by dragging; colours show {colours}"
     yield view(title, run.axis.symbol, run.axis.unit, times, shapes)
+
+
+def _stress(meshes: Sequence[PartMesh], nodes: NDArray[np.int64]) -> Array | None:
+    """(f, n) at the nodes that are drawn; None of a part that tells none."""
+    told = [mesh.more.get(STRESS.array) for mesh in meshes]
+    return None if any(one is None for one in told) else np.array([one[nodes] for one in told if one is not None])
 
 
 def _path(run: BodyPath) -> Iterator[str]:
@@ -142,6 +179,8 @@ def _cells(
     """Nodes that are drawn, and lines and triangles of these."""
     by_kind = {kind: np.asarray(found, dtype=int) for kind, found in cells}
     triangles, lines = (by_kind.get(kind, np.zeros((0, n), dtype=int)) for kind, n in (("triangle", 3), ("line", 2)))
+    if (quads := by_kind.get("quad")) is not None:
+        triangles = np.concatenate([triangles, quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
     nodes = np.unique(np.concatenate([triangles.ravel(), lines.ravel()])) if len(triangles) or len(lines) else None
     if nodes is None:
         return np.arange(count), [], []
@@ -170,41 +209,6 @@ def _carried(points: Array, nodes: NDArray[np.int64]) -> tuple[NDArray[np.int64]
     return nodes[chosen], weights
 
 
-def _histories(x: str, along: Array, found: Sequence[tuple[str, Quantity]]) -> Iterator[str]:
-    """Plots of all columns: vectors by themselves, scalars of a kind together."""
-    vectors = [(name, q) for name, q in found if q.values.ndim == 2]
-    grouped: dict[tuple[str, str], list[Curve]] = {}
-    for name, q in found:
-        if q.values.ndim == 1:
-            base, _, last = name.rpartition(".")
-            kind = "Energy" if base == "energy" else _GROUPS.get(last, "Further readings")
-            label = last if kind == "Energy" else base if kind in _GROUPS.values() else name
-            grouped.setdefault((kind, q.unit), []).append(Curve(label, along, q.values))
-    places = [(name, q) for name, q in vectors if q.unit == "m"]
-    if places:
-        yield heading("Places")
-        yield from (_vector(x, along, name, q) for name, q in places)
-    for kind in dict.fromkeys(kind for kind, _ in grouped):
-        yield heading(kind)
-        for (one, unit), curves in grouped.items():
-            if one == kind:
-                yield figure(Plot("", x, f"{kind.lower()} [{unit}]", curves))
-    loads = [(name, q) for name, q in vectors if q.unit != "m"]
-    if loads:
-        yield heading("Forces and moments")
-        largest = {q.unit: max(_largest(one) for _, one in loads if one.unit == q.unit) for _, q in loads}
-        yield from (_vector(x, along, name, q, _NOTHING * largest[q.unit]) for name, q in loads)
-
-
-def _largest(q: Quantity) -> float:
-    return float(np.abs(q.values[np.isfinite(q.values)]).max(initial=0.0))
-
-
-def _vector(x: str, along: Array, name: str, q: Quantity, least: float = 0.0) -> str:
-    curves = [Curve(axis, along, q.values[:, k]) for k, axis in enumerate("xyz")]
-    return figure(Plot(name, x, f"[{q.unit}]", curves, note="world axes", least=least))
-
-
 def _modes(run: ChainRun, times: Array) -> Iterator[str]:
     """Spectra, and which modes take part."""
     outputs = run_outputs(run, times)
@@ -223,11 +227,12 @@ def _modes(run: ChainRun, times: Array) -> Iterator[str]:
         for k, (share, kind, frequency) in enumerate(
             zip(shares, outputs.mode_kinds[link], outputs.mode_frequencies[link], strict=True), 1
         )
-        if share > 0
+        if share > _LEAST_SHARE
     ]
     if rows:
         yield heading("Modes")
-        yield paragraph("Share of each elastic mode in the elastic energy of its link, mean over time.", "note")
+        told = "Share of each elastic mode in the elastic energy of its link, mean over time"
+        yield paragraph(f"{told}; modes without a row take no part but rounding.", "note")
         yield table(("link", "mode", "frequency of the free link [Hz]", "kind", "share [%]"), rows)
 
 
@@ -241,5 +246,4 @@ def _solver(run: Run, repeat: Sequence[str]) -> Iterator[str]:
     rows = [(name, package_version(name)) for name in _PROGRAMS]
     yield table(("program", "version"), rows)
     settings = json.dumps(json.loads(msgspec.json.encode(run.scene.record)), indent=1)
-    yield paragraph("The scene, with all defaults:", "note")
-    yield code(settings)
+    yield folded("The scene, with all defaults", code(settings))

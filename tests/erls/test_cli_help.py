@@ -18,9 +18,9 @@ OPTIONS = {
     "simulate": ["--output", "-o", "--formulation", "--set", "--at", "--strict", "--verdict", "--no-verdict",
                  "--resume", "--until", "--report", "--force", "--json"],
     "compare": ["--output", "-o", "--formulations", "--state", "--resume", "--set", "--workers", "--force", "--json"],
-    "study modes": ["--output", "-o", "--counts", "--frequencies", "--link", "--tolerance", "--load-tolerance",
-                    "--frequency-tolerance", "--beside", "--state", "--resume", "--set", "--workers", "--force",
-                    "--json"],
+    "study modes": ["--output", "-o", "--counts", "--frequencies", "--ranked", "--link", "--tolerance",
+                    "--load-tolerance", "--frequency-tolerance", "--beside", "--state", "--resume", "--set",
+                    "--workers", "--force", "--json"],
     "study cost": ["--output", "-o", "--tolerance", "--formulations", "--modes", "--integrators", "--effects",
                    "--points", "--norm", "--reference", "--budget", "--apply", "--state", "--resume", "--set",
                    "--workers", "--force", "--json"],
@@ -39,7 +39,7 @@ OPTIONS = {
     "examples copy": ["--json"],
     "schema": ["--output", "-o", "--force", "--json"],
     "info": ["--json"],
-    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--stress", "--fps", "--speed", "--overlay", "--force",
+    "view": ["--output", "-o", "--at", "--mode", "--magnify", "--color", "--fps", "--speed", "--overlay", "--force",
              "--json"],
 }
 
@@ -103,3 +103,31 @@ def test_runs_on_reduced_links_load_no_solver(tmp_path: Path) -> None:
         last.append(done.stdout.splitlines()[-1])
     solver = "fe_import.solver scipy.sparse"  # the verdict's, for the meshes of links
     assert last == [f"loaded fe_import.reduce {solver}", "loaded", f"loaded {solver}"]
+
+
+def test_points_of_sweeps_of_chains_load_no_nodal_elements(tmp_path: Path) -> None:
+    """Nor what draws, tests or reduces: workers start with what a chain on a link that is known needs."""
+    heavy = ("erls.equations.nodal", "erls.run.bodies", "erls.equations.loops.closure", "fe_import.reduce")
+    heavy += ("scipy.sparse", "scipy.spatial", "scipy.stats", "matplotlib", "pyvista", "skfem", "rich")
+    code = (
+        "import sys\nfrom pathlib import Path\nfrom erls.studies.sweep.evaluate import Task, evaluate\n"
+        "task = Task(Path(sys.argv[1]), ('simulation.duration=0.01',), ('joints.0.initial.position_deg',),\n"
+        "            [(1, (5.0,))], ('tip.z@end',), False)\n"
+        "[row] = evaluate(task)\nassert row.numbers is not None, row\n"
+        f"print('loaded', *sorted(name for name in sys.modules if name.startswith({heavy!r})))"
+    )
+    scene = str(Path(__file__).parents[2] / "data/l_shape/steel_flat.toml")
+    environment = {**os.environ, "ERLS_CACHE": str(tmp_path), "ERLS_KERNELS": os.environ["ERLS_KERNELS"]}
+    for _ in range(2):  # the first one reduces the link
+        command = [sys.executable, "-c", code, scene]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True, env=environment)
+    assert done.stdout.splitlines()[-1] == "loaded"
+
+
+def test_a_command_that_ends_leaves_its_objects_alone() -> None:
+    """Looking for cycles among them took a fifth of the time of a short run; within Python they are looked at."""
+    code = "import gc, sys\nfrom erls.cli.main import main\nassert main({0}) == 0\nprint(gc.get_freeze_count() > 0)"
+    for arguments, frozen in (("", "True"), ("['examples', 'list']", "False")):
+        command = [sys.executable, "-c", code.format(arguments), "examples", "list"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True)
+        assert done.stdout.splitlines()[-1] == frozen

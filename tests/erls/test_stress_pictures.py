@@ -7,6 +7,7 @@ from pathlib import Path
 import meshio
 import numpy as np
 import pytest
+import scenes
 from numpy.typing import NDArray
 from PIL import Image
 from test_shell_chains import arm, described, run_of, strip
@@ -35,9 +36,9 @@ def rolled() -> BodyRest:
 def test_stress_of_a_strip_rolled_up_is_that_of_a_beam(rolled: BodyRest, tmp_path: Path) -> None:
     """E t κ / 2 at both surfaces of every node, to rounding; an export holds it."""
     bent = 1e-6 * 1200.0 * 0.05 * 2 * np.pi / 12.0
-    (pose,) = figure_of(rolled, 1.0, stress=True).poses([1.0])
+    (pose,) = figure_of(rolled, 1.0, color="stress").poses([1.0])
     np.testing.assert_allclose(pose.values()[0], bent, rtol=1e-9)
-    write_view(rolled, tmp_path / "strip.pvd", times=[1.0], stress=True)
+    write_view(rolled, tmp_path / "strip.pvd", times=[1.0], color="stress")
     (file,) = (tmp_path / "strip_files").iterdir()
     np.testing.assert_allclose(meshio.read(file).point_data["von_mises_MPa"], bent, rtol=1e-9)
 
@@ -45,8 +46,8 @@ def test_stress_of_a_strip_rolled_up_is_that_of_a_beam(rolled: BodyRest, tmp_pat
 def test_a_picture_of_stress_says_so(rolled: BodyRest, tmp_path: Path) -> None:
     """Other colours than those of deflection: as much stress at the clamp, which does not move, as anywhere."""
     blue = []
-    for stress in (False, True):
-        picture(rolled, tmp_path / "it.png", times=[1.0], size=(400, 300), stress=stress)
+    for color in ("deflection", "stress"):
+        picture(rolled, tmp_path / "it.png", times=[1.0], size=(400, 300), color=color)
         with Image.open(tmp_path / "it.png") as image:
             pixels = np.asarray(image.convert("RGB")).astype(int)
         blue.append((pixels[..., 2] - pixels[..., 0] > 60).sum())
@@ -61,7 +62,7 @@ def test_links_of_shells_show_theirs(tmp_path: Path) -> None:
     found, times = [], np.linspace(0.0, 0.1, 21)
     for formulation in ("erls", "nodal"):
         run = run_of(arm(tmp_path, formulation))
-        (pose,) = figure_of(run, 1.0, stress=True).poses([0.1])
+        (pose,) = figure_of(run, 1.0, color="stress").poses([0.1])
         stress = erls.stress(run, "strip", times)
         assert np.fmax.reduce(pose.values()[0]) == pytest.approx(1e-6 * von_mises(stress[-1]).max(), rel=1e-12)
         nodes = run.formulation.mechanism.links[0].model.nodes
@@ -73,6 +74,28 @@ def test_links_of_shells_show_theirs(tmp_path: Path) -> None:
     assert np.abs(found[1] - found[0]).max() < 0.12 * np.abs(found[0]).max()
 
 
+def test_links_of_beams_show_their_section_forces(tmp_path: Path) -> None:
+    """At every node the larger length of those of the ends that meet there, in pictures and exports."""
+    scenes.l_link(tmp_path, recovery={"all": True})
+    run = erls.simulate(scenes.l_scene(tmp_path, simulation={"duration": 0.02}), verdict=False)
+    places = recovery_places(run, "l").nodes
+    forces = erls.section_forces(run, "l", 0.02)
+    for color, parts, array in (("section-force", slice(0, 3), "section_force_N"),
+                                ("section-moment", slice(3, 6), "section_moment_Nm")):  # fmt: skip
+        (pose,) = figure_of(run, 1.0, color).poses([0.02])
+        (values,) = pose.values()
+        sizes = np.linalg.norm(forces[:, parts], axis=1)
+        for node in np.unique(places):
+            assert values[node] == pytest.approx(sizes[places == node].max(), rel=1e-12)
+        write_view(run, tmp_path / "l.pvd", times=[0.02], color=color)
+        (file,) = (tmp_path / "l_files").iterdir()
+        np.testing.assert_allclose(meshio.read(file).point_data[array], values, rtol=1e-12)
+    with pytest.raises(SceneError, match="holds stress"):
+        figure_of(run, 1.0, "stress")
+    with pytest.raises(SceneError, match="section-moment"):
+        figure_of(run, 1.0, "moments")
+
+
 def test_refusals(rolled: BodyRest, tmp_path: Path) -> None:
     """Where nothing holds stress, of modes, in tables."""
     beams = erls.simulate(erls.load_scene(ROOT / "data/statics/bend_45.toml"), verdict=False)
@@ -80,9 +103,9 @@ def test_refusals(rolled: BodyRest, tmp_path: Path) -> None:
     found = erls.simulate(erls.load_scene(ROOT / "data/shells/roll_up.toml", heavy), verdict=False)
     for run in (beams, mode_of(found, 1)):
         with pytest.raises(SceneError, match=r"holds stress|no scale"):
-            figure_of(run, 1.0, stress=True)
+            figure_of(run, 1.0, color="stress")
     with pytest.raises(SceneError, match="do not show it"):
-        write_view(rolled, tmp_path / "strip.csv", stress=True)
+        write_view(rolled, tmp_path / "strip.csv", color="stress")
 
 
 def _volume(places: NDArray[np.float64], triangles: NDArray[np.int64]) -> float:

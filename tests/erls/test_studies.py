@@ -23,7 +23,7 @@ from erls.studies.compare import compare
 from erls.studies.compare_result import comparison_summary, distance, pair
 from erls.studies.mode_count import study_modes
 from erls.studies.mode_overrides import default_counts
-from erls.studies.mode_result import Change, Tolerances, changed, relative_change
+from erls.studies.mode_result import Change, Tolerances, changed, relative_change, study_summary
 from erls.studies.outputs import Outputs, run_outputs
 from erls.studies.pool import run_all
 from erls.studies.spectrum import amplitude_spectrum, peaks
@@ -201,6 +201,47 @@ def test_mode_study(l_scene: Path) -> None:
     assert "complete: all 18 elastic modes" in text
     assert max(map(len, text.split("\n\n")[1].splitlines())) <= 100
     assert kind in text
+
+
+def test_ranked_modes_are_counted_in_their_order(tmp_path: Path, l_scene: Path) -> None:
+    """Rows are runs of links that keep as many of their ranking, which ends the study; links that rank nothing, and
+    other ways to say how many, are refused.
+    """
+    ranking = {"driving": ["root.rx"], "observed": ["tip.uz"], "count": 6}
+    scenes.l_link(tmp_path, reduction={"selection": "ranking", "ranking": ranking})
+    path = scenes.l_scene(tmp_path, simulation={"duration": 0.1, "step": 1e-3})
+    study = study_modes(path, ranked=True, workers=1)
+    assert [p.modes for p in study.points] == [1, 2, 3, 4, 6]
+    assert study.exhausted
+    two = 'links.l.reduction.ranking={driving=["root.rx"], observed=["tip.uz"], count=2}'
+    run, outputs = erls.simulate(erls.load_scene(path, [two])), study.points[1].outputs
+    assert outputs is not None
+    assert len(outputs.mode_energy["l"]) == run.elastic_coordinates("l", 0.0).size == 2 + 12 - 6
+    np.testing.assert_allclose(outputs.points["tip"][-1], run.position("tip", run.end), atol=1e-12)
+    text = mode_study_text(study)
+    assert "complete: all 6 ranked fixed-interface modes" in text.replace("\n", " ")
+    assert "ranked_modes" in study_summary(study)["points"][0]
+    for faulty, arguments, message in (
+        (l_scene, {}, "ranks its fixed-interface modes"),
+        (path, {"counts": [0, 2]}, "ranked modes"),
+        (path, {"frequencies": [100.0]}, "two ways to say the same"),
+    ):
+        with pytest.raises(SceneError, match=message):
+            study_modes(faulty, ranked=True, **arguments)  # type: ignore[arg-type]
+
+
+def test_the_table_of_a_mode_study_fits_a_terminal(l_scene: Path) -> None:
+    """Of 100 columns, whatever links recover, and however long names are."""
+    study = study_modes(l_scene, [1, 2], workers=1)
+    kinds = ("section-force l near the root", "section-moment l near the root", "stress l", "spectrum tip")
+    more = tuple(Change(f"{kind} {'and so on' * 9}", 1e-3, "of peak", 1e9) for kind in kinds)
+    last = study.points[-1]
+    wide = replace(study, points=(*study.points[:-1], replace(last, changes=(*more, *last.changes))))
+    lines = mode_study_text(wide).splitlines()
+    [head] = [line for line in lines if line.startswith("modes")]
+    for kind in ("points", "angles", "forces", "moments", "efforts", "sections", "stress", "peaks", "worst", "ok"):
+        assert kind in head
+    assert max(map(len, lines)) <= 100
 
 
 def test_three_successive_changes_are_asked_for(l_scene: Path) -> None:

@@ -4,8 +4,8 @@
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const read = (box) => JSON.parse(document.getElementById(box.id + "-data").textContent);
   const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
-  const LIGHT = ["#3d55c8", "#c25b00", "#1f7a4d", "#b3261e", "#7a3fa0", "#5a6169", "#0a7d8c", "#a0206e"];
-  const DARK = ["#9db0ff", "#ffb066", "#7fd3a3", "#f28b82", "#cfa3f0", "#b8bec4", "#6fd3e0", "#f29ac8"];
+  const LIGHT = ["#3d55c8", "#c25b00", "#1f7a4d", "#b3261e", "#7a3fa0", "#5a6169", "#0a7d8c", "#a0206e", "#7d6608", "#1d6fb8", "#5b4636", "#4f7a00"];
+  const DARK = ["#9db0ff", "#ffb066", "#7fd3a3", "#f28b82", "#cfa3f0", "#b8bec4", "#6fd3e0", "#f29ac8", "#e3d26f", "#7cc0f5", "#cbb3a1", "#b5dd6a"];
   const drawn = [];
   const still = { displaylogo: false, displayModeBar: matchMedia("(hover: hover)").matches ? "hover" : false, responsive: true, modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
 
@@ -24,15 +24,19 @@
     return found;
   }
 
-  const wide = (least) => (least > 0 ? { autorangeoptions: { include: [-least, least] } } : {});
+  function counts(plot) { // along numbers of modes or steps no mark stands between two of them
+    const all = plot.curves.flatMap((curve) => curve.x);
+    if (plot.logarithmic.includes("x") || !all.length || !all.every(Number.isInteger)) return {};
+    return { tick0: 0, dtick: Math.max(1, Math.ceil((Math.max(...all) - Math.min(...all)) / 10)) };
+  }
 
   function layout(plot) {
     return {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", colorway: dark.matches ? DARK : LIGHT,
       font: { color: colour("text"), size: 12, family: "system-ui, sans-serif" }, margin: { l: 62, r: 12, t: 12, b: 48 },
       xaxis: { ...axis(plot.x, plot.logarithmic.includes("x")), showspikes: true, spikemode: "across", spikesnap: "cursor",
-        spikethickness: 1, spikecolor: colour("soft"), spikedash: "solid" },
-      yaxis: { ...axis(plot.y, plot.logarithmic.includes("y")), ...wide(plot.least) }, hovermode: "x unified", shapes: shapes(plot, null),
+        spikethickness: 1, spikecolor: colour("soft"), spikedash: "solid", ...counts(plot) },
+      yaxis: { ...axis(plot.y, plot.logarithmic.includes("y")) }, hovermode: "x unified", shapes: shapes(plot, null),
       hoverlabel: { bgcolor: colour("paper"), font: { color: colour("text") } },
       modebar: bar(), legend: { orientation: "h", y: -0.22, x: 0 }, showlegend: plot.curves.length > 1,
     };
@@ -47,7 +51,9 @@
   }
 
   function drawPlot(box) {
-    const plot = read(box);
+    const plot = read(box), longest = Math.max(...plot.curves.map((curve) => curve.label.length));
+    const rows = Math.ceil(plot.curves.length / Math.max(1, Math.floor(box.clientWidth / (7 * longest + 45))));
+    box.style.height = `${box.clientHeight + 19 * (rows - 1)}px`; // a legend of many rows takes nothing from the plot
     Plotly.newPlot(box, traces(plot), layout(plot), still);
     const entry = { box, plot };
     drawn.push(entry);
@@ -61,10 +67,11 @@
     cancelAnimationFrame(pointed);
     pointed = requestAnimationFrame(() => {
       for (const { box, plot } of drawn) {
-        if (plot === null || plot.x !== label || except?.box === box || plot.logarithmic.includes("x")) continue;
+        if (plot === null || plot.x !== label || plot.logarithmic.includes("x")) continue;
+        const at = except?.box === box ? null : x; // the one that is pointed at has a line of its own
         const { top, bottom } = box.getBoundingClientRect();
         if (bottom < -200 || top > innerHeight + 200) continue;
-        Plotly.relayout(box, { shapes: shapes(plot, x) });
+        if (at !== null || box.layout.shapes?.length) Plotly.relayout(box, { shapes: shapes(plot, at) });
       }
     });
   }
@@ -80,13 +87,14 @@
   function drawView(box) {
     const told = read(box), frames = told.times.length;
     const parts = told.parts.map((part) => ({ ...part, rest: numbers(part.rest), moved: numbers(part.moved),
-      weights: part.weights ? numbers(part.weights) : null }));
+      weights: part.weights ? numbers(part.weights) : null, stress: part.stress ? numbers(part.stress) : null }));
     const controls = document.getElementById(box.id + "-controls");
     const [time, factor] = controls.querySelectorAll("input"), [timeText, factorText] = controls.querySelectorAll("output");
-    const play = controls.querySelector("button");
+    const play = controls.querySelector("button"), shade = controls.querySelector("select");
     time.max = frames - 1;
-    let largest = 0, farthest = 0;
+    let largest = 0, farthest = 0, hardest = 0;
     for (const part of parts) {
+      for (const value of part.stress ?? []) if (value > hardest) hardest = value;
       for (const value of part.rest) farthest = Math.max(farthest, Math.abs(value));
       for (let k = 0; k < part.moved.length; k += 3) {
         largest = Math.max(largest, Math.hypot(part.moved[k], part.moved[k + 1], part.moved[k + 2]));
@@ -109,10 +117,12 @@
     function places(part, frame) {
       const scale = magnification(), found = { x: [], y: [], z: [], size: [] };
       const rest = drawnAt(part, frame, part.rest), moved = drawnAt(part, frame, part.moved);
+      const stress = part.stress && stressed() ? part.stress.subarray((frame * rest.length) / 3, ((frame + 1) * rest.length) / 3) : null;
       for (let i = 0; i < rest.length; i += 3) {
         const dx = moved[i], dy = moved[i + 1], dz = moved[i + 2];
         found.x.push(rest[i] + scale * dx); found.y.push(rest[i + 1] + scale * dy);
-        found.z.push(rest[i + 2] + scale * dz); found.size.push(1e3 * Math.hypot(dx, dy, dz));
+        found.z.push(rest[i + 2] + scale * dz);
+        found.size.push(stress === null ? 1e3 * Math.hypot(dx, dy, dz) : Number.isNaN(stress[i / 3]) ? -UNKNOWN * hardest : stress[i / 3]);
       }
       return found;
     }
@@ -128,24 +138,39 @@
     }
 
     const COLOURS = ["#4c5bd4", "#29a9d8", "#5cc26a", "#e8b03a", "#c62828"].map((c, k) => [k / 4, c]);
-    const scale = { colorscale: COLOURS, cmin: 0, cmax: largest > 1e-12 * farthest ? 1e3 * largest : 1 }; // less is rounding
-    const legend = { title: { text: "deflection [mm]", side: "right" }, thickness: 12, len: 0.7, outlinewidth: 0 };
+    const GREY = "#8a9096", UNKNOWN = 0.02; // grey below nothing: stress that is not known at a node
+    const above = (x) => (UNKNOWN + x) / (1 + UNKNOWN);
+    const stressed = () => shade !== null && shade.value === "stress";
+    function colours() {
+      if (!stressed()) return { colorscale: COLOURS, cmin: 0, cmax: largest > 1e-12 * farthest ? 1e3 * largest : 1 }; // less is rounding
+      const known = COLOURS.map(([x, c]) => [above(x), c]);
+      return { colorscale: [[0, GREY], [0.9 * above(0), GREY], ...known], cmin: -UNKNOWN * hardest, cmax: hardest || 1 };
+    }
+    const narrow = () => box.clientWidth < 560;
+    function legend() {
+      const side = narrow() ? { orientation: "h", x: 0.5, y: -0.02, yanchor: "top", len: 0.9 } : { len: 0.7 };
+      const text = stressed() ? "stress, von Mises [MPa]" : "deflection [mm]";
+      return { title: { text, side: narrow() ? "bottom" : "right" }, thickness: 12, outlinewidth: 0, ...side };
+    }
     function trace(part, frame, first) {
-      const found = places(part, frame);
+      const found = places(part, frame), scale = colours(), colorbar = legend();
+      const plain = stressed() && !part.stress; // a part that tells no stress
       if (part.triangles.length) {
         const [i, j, k] = [0, 1, 2].map((n) => part.triangles.map((t) => t[n]));
-        return { type: "mesh3d", name: part.name, x: found.x, y: found.y, z: found.z, i, j, k, intensity: found.size, ...scale,
-          showscale: first, colorbar: legend, hoverinfo: "name", flatshading: false };
+        const surface = { type: "mesh3d", name: part.name, x: found.x, y: found.y, z: found.z, i, j, k, hoverinfo: "name", flatshading: false };
+        return plain ? { ...surface, color: GREY } : { ...surface, intensity: found.size, ...scale, showscale: first, colorbar };
       }
       const path = along(found, part.lines);
       const told = { type: "scatter3d", name: part.name, x: path.x, y: path.y, z: path.z, hoverinfo: "name", showlegend: false };
-      if (!part.lines.length) {
-        return { ...told, ...found, mode: "markers", marker: { size: 5, color: found.size, ...scale, showscale: first, colorbar: legend } };
-      }
-      return { ...told, mode: "lines", line: { width: 7, color: path.size, ...scale, showscale: first, colorbar: legend } };
+      const drawn = (size, values) => (plain ? { ...size, color: GREY } : { ...size, color: values, ...scale, showscale: first, colorbar });
+      if (!part.lines.length) return { ...told, ...found, mode: "markers", marker: drawn({ size: 5 }, found.size) };
+      return { ...told, mode: "lines", line: drawn({ width: 7 }, path.size) };
     }
 
-    const all = (frame) => parts.map((part, k) => trace(part, frame, k === 0));
+    const all = (frame) => {
+      const first = parts.findIndex((part) => !stressed() || part.stress);
+      return parts.map((part, k) => trace(part, frame, k === first));
+    };
     const side = (title) => ({ title: { text: title }, gridcolor: colour("grid"), color: colour("text"), backgroundcolor: "rgba(0,0,0,0)",
       showbackground: false });
     function ranges() {
@@ -167,10 +192,31 @@
       const [x, y, z] = lengths.map((length) => (1.3 * length) / longest);
       return { x, y, z };
     }
+    const FROM = [0.607, -0.693, 0.39], HALF = Math.tan(Math.PI / 8); // where one looks from, and half of what is seen
+    function eye(sides) { // as near as all corners of the box are in sight, with their marks
+      const across = [0.752, 0.659, 0], up = [-0.257, 0.293, 0.921], shape = box.clientWidth / box.clientHeight;
+      const along = (axis, signs) => axis.reduce((sum, a, k) => sum + 0.5 * a * signs[k] * sides[k], 0);
+      let distance = 0;
+      for (let n = 0; n < 8; n++) {
+        const signs = [1, 2, 4].map((bit) => (n & bit ? 1 : -1));
+        const seen = Math.max(Math.abs(along(up, signs)), Math.abs(along(across, signs)) / shape) + 0.2;
+        distance = Math.max(distance, along(FROM, signs) + seen / HALF);
+      }
+      const [x, y, z] = FROM.map((a) => a * distance);
+      return { x, y, z };
+    }
+    let fitted = "";
+    function camera(aspect) { // kept once somebody turned it
+      const found = box.layout?.scene?.camera;
+      if (found && JSON.stringify(found.eye) !== fitted) return found;
+      const at = eye([aspect.x, aspect.y, aspect.z]);
+      fitted = JSON.stringify(at);
+      return { eye: at };
+    }
     function scene() {
-      const [x, y, z] = ranges();
+      const [x, y, z] = ranges(), aspect = ratio(x, y, z);
       return { xaxis: { ...side("x [m]"), range: x }, yaxis: { ...side("y [m]"), range: y }, zaxis: { ...side("z [m]"), range: z },
-        aspectmode: "manual", aspectratio: ratio(x, y, z), camera: box.layout?.scene?.camera ?? { eye: { x: 1.4, y: -1.6, z: 0.9 } }, dragmode: "orbit" };
+        aspectmode: "manual", aspectratio: aspect, camera: camera(aspect), dragmode: "orbit", domain: narrow() ? { y: [0.14, 1] } : { x: [0, 0.9] } };
     }
     const whole = () => ({ scene: scene(), margin: { l: 0, r: 0, t: 0, b: 0 }, paper_bgcolor: "rgba(0,0,0,0)", showlegend: false, modebar: bar(),
       font: { color: colour("text"), family: "system-ui, sans-serif" }, uirevision: "kept" });
@@ -194,6 +240,7 @@
     });
     time.addEventListener("input", show);
     factor.addEventListener("input", show);
+    shade?.addEventListener("change", show);
     drawn.push({ box, plot: null, again: show });
     show();
   }
@@ -232,6 +279,7 @@
       for (const entry of entries) if (entry.isIntersecting) { seen.unobserve(entry.target); draw(entry.target); }
     }, { rootMargin: "400px" });
     document.querySelectorAll(".plot, .view").forEach((box) => seen.observe(box));
+    addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((more) => { more.open = true; }));
     addEventListener("beforeprint", () => document.querySelectorAll(".plot, .view").forEach(draw));
     dark.addEventListener("change", () => drawn.forEach(({ box, plot, again }) => {
       if (again) again(); else Plotly.react(box, traces(plot), layout(plot), still);
