@@ -28,7 +28,6 @@ SOURCES = {
     "sfepy": Source("sfepy+sfepy", "github.com/sfepy/sfepy 3f01a19", "BSD-3", "LICENSE"),
     "elmer": Source("ElmerCSC+elmerfem", "github.com/ElmerCSC/elmerfem", "GPL-2+", "LICENSES"),
     "unv2ccx": Source("calculix+unv2ccx", "github.com/calculix/unv2ccx", "GPL-3", "LICENSE"),
-    "unical": Source("psicofil+SalomeToCalculix", "github.com/psicofil/SalomeToCalculix", "GPL-3", "LICENSE"),
     "example-data": Source("ansys+example-data", "github.com/ansys/example-data 246c578", "MIT", "LICENSE"),
     "vtk-data": Source("pyvista+vtk-data", "github.com/pyvista/vtk-data 126ee90", "Apache-2.0", "LICENSE"),
     "dealii": Source("dealii+dealii", "github.com/dealii/dealii 5820fa3", "Apache-2.0 or LGPL-2.1+", "LICENSE.md"),
