@@ -206,7 +206,7 @@ def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck,
     checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
     if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
         return checks
-    condensed = model.stiffness.nnz > _CONDENSED * model.stiffness.shape[0] ** 2
+    condensed = model.stiffness.nnz > _CONDENSED * np.count_nonzero(model.dof_map >= 0) ** 2
     kind = SOUND_IN_CONDENSED if condensed else SOUND_IN_MATRICES
     return (*checks, kind.check(speed, f"{where}: units"))
 
