@@ -44,6 +44,7 @@ from fe_import.solver import chosen_solver
 from fe_import.solver.dense import MECHANISM, singular_matrix
 from fe_import.solver.watch import say, telling
 
+_FEW = 300  # rows that a condensed matrix may have, however sparse it is
 _CONDENSED = 0.5  # share of entries from which on a matrix is a condensed one
 
 
@@ -206,8 +207,9 @@ def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck,
     checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
     if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
         return checks
-    condensed = model.stiffness.nnz > _CONDENSED * np.count_nonzero(model.dof_map >= 0) ** 2
-    kind = SOUND_IN_CONDENSED if condensed else SOUND_IN_MATRICES
+    rows = np.count_nonzero(model.dof_map >= 0)
+    whole = rows > _FEW and model.stiffness.nnz < _CONDENSED * rows**2
+    kind = SOUND_IN_MATRICES if whole else SOUND_IN_CONDENSED
     return (*checks, kind.check(speed, f"{where}: units"))
 
 
