@@ -28,7 +28,13 @@ SOURCES = {
     "sfepy": Source("sfepy+sfepy", "github.com/sfepy/sfepy 3f01a19", "BSD-3", "LICENSE"),
     "elmer": Source("ElmerCSC+elmerfem", "github.com/ElmerCSC/elmerfem", "GPL-2+", "LICENSES"),
     "unv2ccx": Source("calculix+unv2ccx", "github.com/calculix/unv2ccx", "GPL-3", "LICENSE"),
-    "unical": Source("psicofil+SalomeToCalculix", "github.com/psicofil/SalomeToCalculix", "GPL-3", "LICENSE"),
+    "example-data": Source("ansys+example-data", "github.com/ansys/example-data 246c578", "MIT", "LICENSE"),
+    "vtk-data": Source("pyvista+vtk-data", "github.com/pyvista/vtk-data 126ee90", "Apache-2.0", "LICENSE"),
+    "dealii": Source("dealii+dealii", "github.com/dealii/dealii 5820fa3", "Apache-2.0 or LGPL-2.1+", "LICENSE.md"),
+    "seacas": Source("sandialabs+seacas", "github.com/sandialabs/seacas 7191793", "BSD-3", "LICENSE"),
+    "exodus.jl": Source("cmhamel+Exodus.jl", "github.com/cmhamel/Exodus.jl 1f0b5f8", "MIT", "LICENSE.md"),
+    "smesh": Source("SalomePlatform+smesh", "github.com/SalomePlatform/smesh c3bdf4f", "LGPL-2.1+", "COPYING"),
+    "cae": Source("calculix+cae", "github.com/calculix/cae 8a7b525", "GPL-3", "LICENSE"),
     "aster": Source("ZOHAIUB+code_aster", "github.com/ZOHAIUB/code_aster (copy of code_aster)", "GPL-3", "LICENSE"),
     "abaqusreader": Source("JuliaFEM+AbaqusReader.jl", "github.com/JuliaFEM/AbaqusReader.jl", "MIT", "LICENSE.md"),
 }
@@ -56,6 +62,9 @@ class Case(NamedTuple):
 
 _SUPPORTS = ("BOUNDARY",)
 _SPC = ("SPC1", "SPCADD")
+_WORK, _TUREK = "pyansys-workflow/pymapdl-pydpf/", "pysystem-coupling/turek-horn-benchmark/"
+_IOSS = "packages/seacas/libraries/ioss/src/main/test/"
+_PADDER = "src/Tools/padder/resources/testdata/"
 _CDB, _OP2 = "tests/test_data/", "pyNastran/op2/test/examples/"
 
 
@@ -115,12 +124,37 @@ CASES = [
     Case("mfem", "gmsh/v41/homology.asc.v41.msh", "gmsh 4.1, text"),
     Case("libmesh", "tests/meshes/block.msh", "gmsh 2.2, text"),
     Case("elmer", "ElmerGUI/samples/gmsh/sinus0.msh", "gmsh 1", "", "MSH 1"),
-    Case("aster", "astest/ahlv100b.med", "MED (Salome)"),
-    Case("aster", "astest/ssls129c.med", "MED (Salome)"),
-    Case("aster", "astest/rtool01b.med", "MED (Salome)"),
+    Case("aster", "astest/ahlv100b.mmed", "MED (Salome)"),
+    Case("aster", "astest/ssls129c.mmed", "MED (Salome)"),
+    Case("aster", "astest/rtool01b.mmed", "MED (Salome)"),
     Case("sfepy", "meshes/3d/beam_w14.vtk", "VTK", length="m"),
     Case("sfepy", "meshes/3d/hsphere8.vtk", "VTK", length="m"),
     Case("sfepy", "meshes/3d/cylinder.mesh", "Medit", length="m"),
     Case("sfepy", "meshes/3d/elbow2.mesh", "Medit", "", "inverted or flat"),
     Case("mfem", "vtk/bracket_appended_compressed.vtu", "VTU (ParaView)", "", "inverted or flat"),
+    # tried after the readers were written
+    Case("example-data", _WORK + "global.cdb", "Ansys archive (Workbench)"),
+    Case("example-data", _WORK + "local.cdb", "Ansys archive (Workbench)"),
+    Case("example-data", "pyprimemesh/turbine_blade/blade.cdb", "Ansys archive (Workbench)"),
+    Case("example-data", _TUREK + "turek_hron_benchmark_solid.cdb", "Ansys archive", ignore=("DBLOCK",), length="m"),
+    Case("example-data", _TUREK + "turek_hron_solid_model.cdb", "Ansys archive", ignore=("D",), length="m"),
+    Case("example-data", "tech_demos/td-20/pcb_mesh_file.cdb", "Ansys archive", "", "shells: 4346"),
+    Case("seacas", _IOSS + "8-block.g", "Exodus (Cubit)"),
+    Case("seacas", _IOSS + "cube.g", "Exodus (Cubit)"),
+    Case("seacas", "packages/seacas/scripts/tests/exomerge_unit_test.e", "Exodus", "", "pairs of nodes coincide"),
+    Case("exodus.jl", "test/mesh/cube_meshes/mesh_test.g", "Exodus (Cubit)"),
+    Case("exodus.jl", "misc/hole_array.exo", "Exodus", "", "do not have three coordinates"),
+    Case("smesh", "doc/examples/data/test_04.med", "MED (Salome)"),
+    Case("smesh", "doc/examples/data/test_13.med", "MED (Salome)"),
+    Case("smesh", _PADDER + "concrete.med", "MED 2 (Salome)", "", "MED of a version before 3"),
+    Case("dealii", "tests/grid/grid_in_unv_3d/3D.unv", "Universal file (Salome)"),
+    Case("dealii", "tests/grid/grid_in_unv_3d/salome_cube.unv", "Universal file (Salome)"),
+    Case("dealii", "examples/step-97/sphere_r6.msh", "gmsh 2.2, text"),
+    Case("vtk-data", "Data/Hexahedron.vtu", "VTU (VTK)"),
+    Case("vtk-data", "Data/QuadraticTetra.vtu", "VTU (VTK)"),
+    Case("vtk-data", "Data/QuadraticWedge.vtu", "VTU (VTK)"),
+    Case("vtk-data", "Data/QuadraticPyramid.vtu", "VTU (VTK)", ""),
+    Case("vtk-data", "Data/AngularSector.vtk", "VTK", "", "pairs of nodes coincide"),
+    Case("vtk-data", "Data/PentaHexa.vtk", "VTK", "", "cells of type penta_prism"),
+    Case("cae", "examples/default.inp", "CalculiX deck", "", "does not fit its neighbours", _SUPPORTS),
 ]

@@ -18,10 +18,17 @@ from fe_import.files.versions import package_version
 from fe_import.health.materials import check_materials
 from fe_import.health.matrix_scale import speed_of_sound
 from fe_import.health.mechanisms import NOT_CLEAR, mechanism
-from fe_import.health.plausibility import SOUND_IN_MATRICES, plausible_link, plausible_materials, refuse_slips
+from fe_import.health.plausibility import (
+    SOUND_IN_CONDENSED,
+    SOUND_IN_MATRICES,
+    plausible_link,
+    plausible_materials,
+    refuse_slips,
+)
 from fe_import.health.report import RIGID, ROUNDING, check_basis, check_model, check_reduction, mode_residuals
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
+from fe_import.health.thickness import plausible_thickness
 from fe_import.modal.damping import damping_ratios
 from fe_import.modal.equal_frequencies import KEPT_WHOLE
 from fe_import.modal.inertia import inertia_invariants, mass_properties
@@ -36,6 +43,9 @@ from fe_import.second_order.compute import second_order
 from fe_import.solver import chosen_solver
 from fe_import.solver.dense import MECHANISM, singular_matrix
 from fe_import.solver.watch import say, telling
+
+_FEW = 300  # rows that a condensed matrix may have, however sparse it is
+_CONDENSED = 0.5  # share of entries from which on a matrix is a condensed one
 
 
 def reduce_link(link: LinkFile | Path | str, tell: Callable[[str], None] | None = None) -> ModalModel:
@@ -91,7 +101,9 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     units = unit_factors(link.description, where)
     materials = {**link.description.materials, **{name: Material(*m) for name, m in model.materials.items()}}
     unusual = link.description.units.unusual
+    size = float(np.linalg.norm(np.ptp(model.nodes, axis=0)))
     checks = (*plausible_materials(materials, *units, where), *check_materials(materials, *units))
+    checks += plausible_thickness(link.description, size, units[0], where)
     checks = refuse_slips(checks, unusual, where) + check_model(model, where)
     refuse_slips(_unit_checks(model, np.zeros(0), where), unusual, where)  # named before the work is done
     basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
@@ -195,7 +207,10 @@ def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck,
     checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
     if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
         return checks
-    return (*checks, SOUND_IN_MATRICES.check(speed, f"{where}: units"))
+    rows = np.count_nonzero(model.dof_map >= 0)
+    whole = rows > _FEW and model.stiffness.nnz < _CONDENSED * rows**2
+    kind = SOUND_IN_MATRICES if whole else SOUND_IN_CONDENSED
+    return (*checks, kind.check(speed, f"{where}: units"))
 
 
 def _nodal(shapes: Array, rows: IntArray) -> Array:

@@ -16,6 +16,9 @@ from fe_import.model import Array
 SHEAR_CORRECTION = 5 / 6
 
 
+_SAME = 1e-9
+
+
 @dataclass(frozen=True)
 class Lamina:
     """A layer.
@@ -77,6 +80,15 @@ class Laminate:
             if np.abs(one - other).max() > 1e-12 * np.abs(one).max() or layer.shear[0] != layer.shear[1]:
                 return False
         return True
+
+    @property
+    def sided(self) -> bool:
+        """Whether it matters which side is its top: turned over, layers come in reverse order and angles turn back."""
+        over = Laminate(tuple(replace(layer, angle=-layer.angle) for layer in self.layers[::-1]), -self.offset)
+        stiffness, moments = self.stiffness(), self.moments()
+        size = np.sqrt(np.diag(stiffness))
+        bends = np.abs(over.stiffness() - stiffness) > _SAME * np.outer(size, size)
+        return bool(bends.any() or abs(over.moments()[1] - moments[1]) > _SAME * moments[0] * self.thickness)
 
     def stiffness(self) -> Array:
         """(8, 8) [N/m, N, N m], see `fe_import.elements.shell_strains`; about the nodes."""

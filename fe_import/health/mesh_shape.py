@@ -10,7 +10,7 @@ from fe_import.mesh.checks import scaled_jacobians
 from fe_import.modal.model import HealthCheck
 from fe_import.model import Array, IntArray
 
-_SLIVER = 100.0  # inverse of the scaled Jacobian; meshers leave 3 to 30
+_SLIVER = 1000.0  # inverse of the scaled Jacobian; meshers leave 3 to 30, and 250 where edges of thin corners bend
 _SMOOTH = 0.4  # edge lengths: where the surroundings are farther off, nothing leads back
 _OFF = 0.72  # edge lengths; a sound cube of two elements along each side has √½ where three parts meet
 _CORNERS = {3: 3, 4: 4, 6: 3, 8: 4, 9: 4}  # of a face with so many nodes

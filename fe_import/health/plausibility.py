@@ -64,7 +64,7 @@ class Range:
                 remedy=slip[2:],
             )
         span = " to ".join(f"{limit:g}" for limit in (self.low, self.high) if 0 < limit < math.inf)
-        name = f"units: {self.name} against {span} {self.unit}"
+        name = f"units: {self.name} against {span} {self.unit}".rstrip()
         return HealthCheck(f"{name} (it is {value:.3g}{slip})" if slip else name, outside, 1.0)
 
 
@@ -98,11 +98,14 @@ _EXPANSION = Range(
     below="",
     above="µm/(m K) read as 1/K? give 12e-6 for 12 of them",
 )
-SOUND_IN_MATRICES = Range(
-    *("speed of sound in the matrices", "m/s", 20.0, 5e4, 1e-6, 1e9),
-    below="stiffness in N/mm or MPa read as N/m or Pa, or mass in g read as kg? check units and scale of the matrices",
-    above="mass in t read as kg, or stiffness in other units? check units and scale of the matrices",
+_SOUND_SLIPS = (
+    "stiffness in N/mm or MPa read as N/m or Pa, or mass in g read as kg? check units and scale of the matrices",
+    "mass in t read as kg, or stiffness in other units? check units and scale of the matrices",
 )
+SOUND_IN_MATRICES = Range(  # of metals, stiffness in N/mm read as N/m gives 160
+    "speed of sound in the matrices", "m/s", 300.0, 5e4, 1e-6, 1e9, *_SOUND_SLIPS
+)
+SOUND_IN_CONDENSED = Range("speed of sound in the matrices", "m/s", 20.0, 5e4, 1e-6, 1e9, *_SOUND_SLIPS)
 _FREQUENCY = Range(
     *("first elastic frequency", "Hz", 1e-3, 1e7, 1e-9, 1e12),
     below="stiffness in N/mm read as N/m, or mass in g read as kg? check units",

@@ -67,7 +67,21 @@ def check_model(model: FEModel, where: str) -> tuple[HealthCheck, ...]:
         count = HealthCheck("mass matrix: motions of negative kinetic energy", _negative_masses(model), 0.0)
         checks.append((count, negative))
         _refuse(checks[-1:], where)
-    return tuple(check for check, _ in checks) + _left_out(model)
+    return tuple(check for check, _ in checks) + _massless(model) + _left_out(model)
+
+
+def _massless(model: FEModel) -> tuple[HealthCheck, ...]:
+    """Nodes of exported matrices that have stiffness and no mass: reported, as some are made like that."""
+    if model.kind != "matrices":
+        return ()
+    rows = model.dof_map[(model.dof_map[:, :3] >= 0).all(axis=1), :3]
+    rows = rows[np.isin(rows, model.independent).all(axis=1)]
+    bare = (model.mass.diagonal()[rows] == 0).all(axis=1) & (model.stiffness.diagonal()[rows] > 0).any(axis=1)
+    if not bare.any():
+        return ()
+    node = int(np.flatnonzero((model.dof_map[:, :3] == rows[bare][0]).all(axis=1))[0])
+    place = "({:.4g}, {:.4g}, {:.4g})".format(*model.nodes[node])
+    return (HealthCheck(f"nodes with stiffness and without mass, the first at {place}", float(bare.sum()), NO_LIMIT),)
 
 
 def _left_out(model: FEModel) -> tuple[HealthCheck, ...]:
@@ -260,5 +274,5 @@ def check_reduction(
     if model.kind == "matrices":  # of a superelement only the kept nodes are known
         name = "centrifugal terms against those of a rigid body"
         checks.append(HealthCheck(name, rotation_departure(invariants), NO_LIMIT))
-    _refuse(((check, "ask for fewer modes, or look for very stiff or very light parts") for check in checks), where)
+    _refuse(((check, "ask for fewer modes, or look for very stiff, light or heavy parts") for check in checks), where)
     return tuple(checks)

@@ -22,6 +22,8 @@ _FORMAT = re.compile(  # such as (3i9,6e21.13e3), (1i7,2i9,6e21.13), (19i9), (2i
     r"\(\s*(\d*)i(\d+)(?:,\s*(\d*)i(\d+))?(?:,\s*\d*[eg](\d+)\.\d+(?:e\d+)?)?(?:,\s*\d*a\d+)?\s*\)", re.IGNORECASE
 )
 _COMMAND = re.compile(r"\s*([A-Za-z/*_][\w/*:]*)")
+_ASSIGNMENT = re.compile(r"\s*\w+\s*=")
+_IN_COLUMNS = re.compile(r"(.{72})([SGT]) *(\d+)\s*")  # begin of an archive, as IGES has it: title, commands, sizes
 _HEADER = 11  # numbers before the nodes of an element: material, type, ... , count of nodes, -, number
 _MOST_NODES = 30
 _DIGITS = 15
@@ -61,12 +63,14 @@ class _Reader:
         blocks = {"NBLO": self._nodes, "EBLO": self._block, "CMBL": self._component}
         command = ""
         while (line := self._file.line()) is not None:
+            if (marked := _IN_COLUMNS.fullmatch(line)) is not None:
+                line = marked[1] if marked[2] == "S" and marked[3] != "1" else "!"
             match = _COMMAND.match(line.partition("!")[0])
             if match is None:
                 if command[:4] in blocks and line.partition("!")[0].strip():
                     raise self._fault("numbers behind the end of a block", line)
                 continue
-            command = match[1].upper()
+            command = "*SET" if _ASSIGNMENT.match(line) else match[1].upper()
             fields = [f.strip() for f in line.partition("!")[0].split(",")]
             if command[:4] in blocks:
                 blocks[command[:4]](fields)

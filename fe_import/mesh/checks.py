@@ -133,7 +133,9 @@ def _check_shapes(mesh: SolidMesh) -> None:
             mesh,
             f"{bad.size} of {len(jacobians)} elements are inverted or flat, "
             f"the first is {_element(mesh, first)}: {kind}",
-            "the node order is mirrored or not VTK's" if everywhere else "refine or repair the mesh there",
+            "the node order is mirrored or not VTK's"
+            if everywhere
+            else "refine or repair the mesh there, or mend the order of nodes",
             value=float(f"{jacobians[first]:.3g}"),
             limit=f"scaled Jacobian above {FLAT:g}",
         )

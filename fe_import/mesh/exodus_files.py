@@ -1,4 +1,4 @@
-"""Meshes of Exodus II files (.e, .exo) of Cubit, MOOSE, libMesh and others: netCDF, classic or on HDF5.
+"""Meshes of Exodus II files (.e, .exo, .g) of Cubit, MOOSE, libMesh and others: netCDF, classic or on HDF5.
 
 Read here because meshio needs a package for netCDF and loses side sets. Blocks become element sets, side and node sets
 node sets, with their names or as ``block:1``, ``sideset:1``, ``nodeset:1``. After L. A. Schoof & V. R. Yarberry, Exodus
@@ -163,7 +163,10 @@ def _add_block(mesh: RawMesh, kind: str, cells: IntArray) -> SolidElement | None
     else:
         mesh.blocks.append(Block(kind.lower(), 0, cells))
         text = "point masses" if _POINTS.match(kind) else "what is not known here"
-    mesh.left_out.append(LeftOut(kind, len(cells), "its block", text))
+    before = next((item for item in mesh.left_out if item.name == kind), None)
+    if before is not None:
+        mesh.left_out.remove(before)
+    mesh.left_out.append(LeftOut(kind, len(cells) + (before.count if before else 0), "its blocks", text))
     return None
 
 

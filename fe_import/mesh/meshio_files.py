@@ -16,14 +16,24 @@ from typing import Any
 import meshio
 import numpy as np
 
+from fe_import.elements.solid_elements import MESH_ELEMENTS
 from fe_import.errors import Cause, FEImportError
 from fe_import.mesh.guard import bounded_memory, check_declared, check_found
 from fe_import.mesh.raw import Block, RawMesh
 
 meshio._mesh.topological_dimension.update({"wedge15": 3, "pyramid13": 3})  # which meshio 5 knows but for this
 meshio.gmsh.main._readers["4"] = meshio.gmsh._gmsh40  # as gmsh calls MSH 4.0; meshio takes it for 4.1
+for _version in (meshio.vtk._vtk_42, meshio.vtk._vtk_51):
+    _version.vtk_to_numpy_dtype_name["vtkidtype"] = "int32"  # as VTK writes its numbers of cells and points
+meshio.med._med._read_data = lambda *_: None  # results beside the mesh: not needed, and some stop it
+_OF_MED = (".med", ".mmed", ".rmed")  # the last two: meshes and results of Code_Aster
+meshio.extension_to_filetypes.update({suffix: ["med"] for suffix in _OF_MED})
 MOST_GROUPS = 1000  # different numbers in an array; more are labels, not groups
 _SHORT_NAMES = {"gmsh:physical": "physical", "medit:ref": "ref"}
+_MIRRORED = {  # types that a format numbers from the other side; of VTK not all programs do
+    **dict.fromkeys(_OF_MED, frozenset(MESH_ELEMENTS)),
+    **dict.fromkeys((".vtk", ".vtu"), frozenset({"wedge6", "wedge15"})),
+}
 _OTHER_MEANING = {"gmsh:geometrical", "cell_tags", "point_tags", "gmsh:dim_tags"}
 
 
@@ -44,7 +54,7 @@ def read_with_meshio(path: Path, name: str) -> RawMesh:
     raw = _read(path, name)
     blocks = [_block(b, name) for b in raw.cells]
     check_found(path, name, len(raw.points), sum(len(b.cells) for b in blocks))
-    mesh = RawMesh(raw.points, blocks, mirrored=path.suffix.lower() == ".med")
+    mesh = RawMesh(raw.points, blocks, mirrored=_MIRRORED.get(path.suffix.lower(), frozenset()))
     mesh.point_sets.update({str(key): points for key, points in raw.point_sets.items()})
     for key, cells in raw.cell_sets.items():
         if not str(key).startswith("gmsh:"):
@@ -88,8 +98,15 @@ def _read(path: Path, name: str) -> Any:
     except (Exception, SystemExit) as problem:
         told = "" if isinstance(problem, SystemExit) else f"{type(problem).__name__} {problem}"
         reason = " ".join(f"{said.getvalue()} {told}".replace(str(path), "").split())
-        remedy = "the suffix must name the format (.msh, .inp, .bdf, .vtu, .med ...); of gmsh take MSH 4.1"
-        if "Incompatible cell data" in reason or "gmsh:physical" in reason:
+        remedy = "save it again, in another format if need be; the suffix must name the format; of gmsh take MSH 4.1"
+        if path.suffix.lower() not in meshio.extension_to_filetypes:
+            reason = f"no format of meshes is known by the suffix {path.suffix!r}"
+            remedy = "the suffix must name the format (.msh, .inp, .bdf, .vtu, .med ...)"
+        elif isinstance(problem, KeyError) and problem.args[0] in meshio._vtk_common.meshio_to_vtk_type:
+            reason, remedy = f"cells of type {problem.args[0]}", "mesh it without them"
+        elif path.suffix.lower() in _OF_MED and "'ESP'" in reason:  # which MED has since its version 3
+            reason, remedy = "MED of a version before 3", "open it with Salome and export it again"
+        elif "Incompatible cell data" in reason or "gmsh:physical" in reason:
             remedy = "put every entity in a physical group and do not save all elements (Mesh.SaveAll = 0)"
         raise FEImportError(
             Cause.NOT_READABLE, f"cannot be read as a mesh: {reason}", where=name, remedy=remedy

@@ -61,8 +61,8 @@ class RawMesh:
     attachments : list of Attachment
         With numbers of points.
     materials : MeshMaterials
-    mirrored : bool
-        Whether the format turns elements inside out, so that all of them may be.
+    mirrored : frozenset of str
+        Types of solid elements that the format may number inside out; where all of one are, they are turned.
     """
 
     points: Array
@@ -73,4 +73,4 @@ class RawMesh:
     left_out: list[LeftOut] = field(default_factory=list)
     attachments: list[Attachment] = field(default_factory=list)
     materials: MeshMaterials = field(default_factory=MeshMaterials)
-    mirrored: bool = False
+    mirrored: frozenset[str] = frozenset()

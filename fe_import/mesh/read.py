@@ -31,7 +31,7 @@ _READERS = {  # by suffix: module and function, imported when asked for
     ".inp": ("fe_import.mesh.abaqus_files", "read_abaqus"),
     **dict.fromkeys((".bdf", ".fem", ".nas"), ("fe_import.mesh.nastran_files", "read_nastran")),
     ".cdb": ("fe_import.mesh.ansys_files", "read_ansys"),
-    **dict.fromkeys((".e", ".ex2", ".exo"), ("fe_import.mesh.exodus_files", "read_exodus")),
+    **dict.fromkeys((".e", ".ex2", ".exo", ".g", ".gen"), ("fe_import.mesh.exodus_files", "read_exodus")),
     ".unv": ("fe_import.mesh.universal_files", "read_universal"),
 }
 _OTHERS = ("fe_import.mesh.meshio_files", "read_with_meshio")
@@ -122,11 +122,23 @@ def read_mesh(
         tuple(ShellCells(_SHELLS_BY_MESHIO_NAME[n], cells) for n, cells in _joined(raw, shells, dense).items()),
         shell_sets,
     )  # fmt: skip
-    if mesh.blocks and raw.mirrored and np.isfinite(mesh.nodes).all() and (scaled_jacobians(mesh) < 0).all():
-        turned = (replace(block, elements=block.elements[:, block.element.mirrored_order]) for block in mesh.blocks)
-        mesh = replace(mesh, blocks=tuple(turned))
+    mesh = _turned(mesh, raw.mirrored)
     check_mesh(mesh)
     return mesh
+
+
+def _turned(mesh: SolidMesh, types: frozenset[str]) -> SolidMesh:
+    """Elements of these types turned, where all of a type are inside out."""
+    if types.isdisjoint(block.type for block in mesh.blocks) or not np.isfinite(mesh.nodes).all():
+        return mesh
+    inside_out = scaled_jacobians(mesh) < 0
+    blocks = [
+        replace(block, elements=block.elements[:, block.element.mirrored_order])
+        if block.type in types and inside_out[numbers].all()
+        else block
+        for block, _, numbers in mesh.parts()
+    ]
+    return replace(mesh, blocks=tuple(blocks))
 
 
 def _read(path: Path, meshing: Meshing | None) -> RawMesh:

@@ -74,7 +74,7 @@ class _Reader:
             if not self._mesh.points:
                 raise self._fault("no nodes in it: data set 2411 or 781 is missing")
             raw = self._mesh.raw()
-            raw.mirrored = True  # as Salome numbers elements that were drawn by hand
+            raw.mirrored = frozenset(MESH_ELEMENTS)  # as Salome numbers elements that were drawn by hand
         except ValueError as problem:
             raise self._fault(str(problem)) from None
         for (what, text), count in self._left.items():

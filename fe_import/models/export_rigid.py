@@ -17,6 +17,8 @@ _NOTICED = 1e-3  # of the largest force
 _DIRECTED = 1e-6  # mass by direction: files carry 6 digits or more
 _CONDENSED = 1e-5  # resistance that rounding may leave in a condensed matrix: 1e-10 times the condition of a long link
 _EXACT = 1e-9
+_ALL_DIGITS = 9
+_PRINTED = 5.0  # resistance by rounding, per last digit
 _LARGEST = 3000  # rows of a condensed matrix
 _FULL = 0.5  # share of entries from which on a matrix is a condensed one
 
@@ -105,6 +107,12 @@ def _odd(message: str, where: str, value: Array, expected: str) -> FEImportError
 def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
     """What a stiffness that resists rigid-body motion probably is, and what to do."""
     rows = model.dof_map[: len(labels), :3]
+    if len(empty := _without_stiffness(model, rows)):
+        first = row_name(model.dof_map, labels, int(empty[0]))
+        return (
+            f"{len(empty)} displacements of nodes have no stiffness while others of them have, the first is {first}",
+            "export the matrix again: these rows are lost, or belong to other dofs",
+        )
     force = np.abs(model.stiffness @ rigid)
     terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
     if (force[:, :3].max(axis=0) <= GROUNDING * terms[:3]).all():
@@ -124,14 +132,42 @@ def _reason(model: FEModel, rigid: Array, labels: IntArray) -> tuple[str, str]:
     if held.mean() <= _LOCAL:
         return (
             f"the stiffness resists rigid-body motion at nodes {listed(labels[held])}",
-            "a link must be free: remove supports, springs to ground and penalty stiffness from the export",
+            "a link must be free: remove supports, springs to ground and penalty stiffness from the export; without "
+            "any, entries of these nodes are lost or changed",
+        )
+    digits = _significant_digits(model.stiffness)
+    if digits < _ALL_DIGITS and force.max() <= _PRINTED * 10.0**-digits * terms.max():
+        return (
+            f"the stiffness resists rigid-body motion at most nodes, by the rounding of its {digits} digits: forces of "
+            "bending are smaller",
+            "export the matrices with all digits",
         )
     return (
         "the stiffness resists rigid-body motion at most nodes: it is probably the block of the kept dofs of a larger "
-        "matrix, not the condensed one (CalculiX 2.20 writes this for *SUBSTRUCTURE GENERATE), or a held link",
+        "matrix, not the condensed one (CalculiX 2.20 writes this for *SUBSTRUCTURE GENERATE), a held link, or one of "
+        "changed numbers",
         "export the full matrices, in CalculiX by *FREQUENCY, SOLVER=MATRIXSTORAGE, or check supports and the order of "
         "the dofs",
     )
+
+
+def _without_stiffness(model: FEModel, rows: IntArray) -> IntArray:
+    """Rows of displacements whose stiffness is zero, at nodes that have some."""
+    diagonal = model.stiffness.diagonal()
+    own = rows[(rows >= 0).all(axis=1)]
+    empty = diagonal[own] == 0
+    return np.asarray(own[empty & (~empty).any(axis=1, keepdims=True)])
+
+
+def _significant_digits(matrix: sp.csc_array) -> int:
+    """Of the entries as they were printed; `_ALL_DIGITS` where they have these or more."""
+    values = np.abs(matrix.data[matrix.data != 0])
+    size = 10.0 ** np.floor(np.log10(values))
+    for digits in range(2, _ALL_DIGITS):
+        steps = values / size * 10.0 ** (digits - 1)
+        if (np.abs(steps - np.round(steps)) <= 1e-13 * steps + 1e-9).all():
+            return digits
+    return _ALL_DIGITS
 
 
 def _flipped_pair(model: FEModel, force: Array) -> tuple[int, int] | None:

@@ -54,7 +54,34 @@ def shell_parts(link: LinkDescription, shell: Shell, mesh: SolidMesh, where: str
             block = ShellBlock(cells.element, nodes, stiffness, moments, reference)
             parts.append(ShellPart(block, own, make, shell.drilling))
         start += len(cells)
+    _check_normals(parts, mesh.nodes, where)
     return parts
+
+
+def _check_normals(parts: list[ShellPart], nodes: Array, where: str) -> None:
+    """Neighbouring shells look to one side, where their make has two different ones.
+
+    Raises
+    ------
+    FEImportError
+        ``MESH``: their common edge runs the same way in both.
+    """
+    sides = [block.nodes for block in (part.block for part in parts if part.laminate.sided)]
+    if not sides:
+        return
+    edges = np.concatenate([np.stack([n, np.roll(n, -1, axis=1)], axis=2).reshape(-1, 2) for n in sides])
+    common, which, times = np.unique(np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True)
+    forward = np.bincount(which.ravel(), edges[:, 0] < edges[:, 1], minlength=len(common))
+    same = np.flatnonzero((times == 2) & (forward != 1))
+    if len(same):
+        place = "({:.4g}, {:.4g}, {:.4g})".format(*nodes[common[same[0]]].mean(axis=0))
+        raise FEImportError(
+            Cause.MESH,
+            f"normals of neighbouring shells point to opposite sides, at {len(same)} edges, the first at {place}; an "
+            "offset, or layers, count along them",
+            where=f"{where}: shell",
+            remedy="orient the shells in the mesher, or give a thickness that is the same from both sides",
+        )
 
 
 def add_shells(parts: list[ShellPart], where: AttachedNodes, form: str, mass: Entries, stiffness: Entries) -> None:

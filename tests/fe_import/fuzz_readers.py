@@ -6,6 +6,7 @@ import gzip
 import importlib
 import tempfile
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -79,7 +80,14 @@ def description(table: dict[str, Any]) -> bytes:
 def bar() -> Reduced:
     """Two kept nodes, two modes: a free elastic link, its matrices full, no entry like another."""
     with tempfile.TemporaryDirectory() as folder:
-        return condensed(frame_model(Path(folder)), (0, 3, 6), 2)
+        parts = condensed(frame_model(Path(folder)), (0, 3, 6), 2)
+    return replace(parts, mass=_without_rounding(parts.mass), stiffness=_without_rounding(parts.stiffness))
+
+
+def _without_rounding(matrix: np.ndarray) -> np.ndarray:
+    """Zero where only rounding is left, which each library leaves otherwise, and whose damage nobody can notice."""
+    size = np.sqrt(np.abs(np.diag(matrix)))
+    return np.where(np.abs(matrix) > 1e-12 * np.outer(size, size), matrix, 0.0)
 
 
 def _link(kind: str, names: dict[str, str], labels: list[int], **matrices: Any) -> bytes:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import gzip
 from pathlib import Path
 
+import h5py
+import meshio
 import numpy as np
 import pytest
 from mesh_writers import FOLDED, archive, exodus, rows, universal
@@ -97,12 +99,66 @@ def test_middle_nodes_of_ansys(tmp_path: Path) -> None:
     fails(written(tmp_path, "some.cdb", text), Cause.NOT_READABLE, "element 1", "some of its middle nodes")
 
 
-@pytest.mark.parametrize("name", MESH_ELEMENTS)
-def test_exodus_files(tmp_path: Path, name: str) -> None:
+def test_begin_of_archives_in_columns(tmp_path: Path) -> None:
+    """Workbench puts marks behind the first commands, as IGES has them, and names of materials into parameters."""
+    begin = [f"{text:72}S{k:7}" for k, text in enumerate(("wbnew--Static Structural 2", "/COM,ANSYS", "NEQIT,0"), 1)]
+    begin += [f"{'1H,,1H;,,11HD:/OneDrive,':72}G      1", f"{'S      3G      1P      0':72}T      1"]
+    end = ["acp_material_name_5 = 'UD'", "NLDIAG,CONT,ITER", "FC,5,TEMP,,0", "FCUM,ADD", ""]
+    text = "\n".join([*begin, ARCHIVE, *end])
+    same(read_mesh(written(tmp_path, "box.cdb", text)), BOX, 1e-13)
+    fails(written(tmp_path, "d.cdb", text.replace("NEQIT,0", "D,7,UX ")), LOST, "supports", "1 D from line 3")
+
+
+@pytest.mark.parametrize("suffix", [".vtk", ".vtu"])
+@pytest.mark.parametrize("name", ["wedge6", "wedge15"])
+def test_wedges_of_vtk(tmp_path: Path, name: str, suffix: str) -> None:
+    """VTK's own wedges look out of their first triangle, those that other programs write look in."""
+    mesh = box(name, (2, 1, 1))
+    turned = mesh.only.elements[:, np.argsort(mesh.only.element.mirrored_order)]
+    for elements in (mesh.only.elements, turned):
+        meshio.write(tmp_path / f"box{suffix}", meshio.Mesh(mesh.nodes, [(mesh.only.element.meshio_name, elements)]))
+        same(read_mesh(tmp_path / f"box{suffix}"), mesh)
+    some = np.vstack([turned[:1], mesh.only.elements[1:]])
+    meshio.write(tmp_path / f"box{suffix}", meshio.Mesh(mesh.nodes, [(mesh.only.element.meshio_name, some)]))
+    fails(tmp_path / f"box{suffix}", Cause.MESH, "1 of 4 elements are inverted")
+
+
+def test_legacy_files_of_vtk(tmp_path: Path) -> None:
+    """Numbers of cells, as ParaView adds them, and cells that are no elements here."""
+    meshio.write(tmp_path / "box.vtk", meshio.Mesh(BOX.nodes, [("hexahedron", BOX.only.elements)]), binary=False)
+    text = (tmp_path / "box.vtk").read_text()
+    ids = "CELL_DATA 2\nFIELD FieldData 1\nCellId 1 2 vtkIdType\n1 2\n"
+    found = read_mesh(written(tmp_path, "ids.vtk", text + ids))
+    same(found, BOX)
+    assert set(found.element_sets) == {"CellId:1", "CellId:2"}
+    other = text.replace("CELL_TYPES 2\n12\n12", "CELL_TYPES 2\n15\n15")
+    assert other != text
+    fails(written(tmp_path, "other.vtk", other), NOT_READ, "cells of type penta_prism")
+
+
+@pytest.mark.parametrize("suffix", [".med", ".mmed", ".rmed"])
+def test_med_files_with_results(tmp_path: Path, suffix: str) -> None:
+    """Suffixes of Code_Aster; fields beside the mesh are not read, whatever is in them."""
+    path = tmp_path / f"box{suffix}"
+    meshio.write(path, meshio.Mesh(BOX.nodes, [("hexahedron", BOX.only.elements)]), file_format="med")
+    with h5py.File(path, "a") as data:
+        data.create_dataset("CHA/DEPL/step", data=1.0)
+    same(read_mesh(path), BOX)
+    with h5py.File(path, "a") as data:
+        del data["ENS_MAA"]["mesh"].attrs["ESP"]
+    fails(path, NOT_READ, "MED of a version before 3", "Salome")
+
+
+def test_suffixes_of_no_format(tmp_path: Path) -> None:
+    fails(written(tmp_path, "box.foo", UNIVERSAL), NOT_READ, "no format of meshes is known by the suffix '.foo'")
+
+
+@pytest.mark.parametrize(("name", "suffix"), [*((name, ".e") for name in MESH_ELEMENTS), ("hex8", ".g")])
+def test_exodus_files(tmp_path: Path, name: str, suffix: str) -> None:
     """Blocks, node sets and side sets, whose names and numbers are kept."""
     mesh = box(name, (2, 1, 2), distortion=0.2, curvature=0.02)
-    exodus(tmp_path / "box.e", mesh)
-    found = read_mesh(tmp_path / "box.e")
+    exodus(tmp_path / f"box{suffix}", mesh)
+    found = read_mesh(tmp_path / f"box{suffix}")
     same(found, mesh)
     for group in ("nodeset:3", "FACES"):
         np.testing.assert_array_equal(found.node_sets[group], mesh.node_sets["x1"])

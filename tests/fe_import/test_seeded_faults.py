@@ -6,6 +6,7 @@ links, and all of ``data``, raise no alarm.
 
 from __future__ import annotations
 
+import gzip
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
@@ -65,6 +66,16 @@ def solid(*words: str, text: Callable[[], str] | None = None, reported: bool = F
     return Fault(make, words, reported)
 
 
+def shell(*words: str, **changes: Any) -> Fault:
+    """The bracket of ``data``, whose two legs look to opposite sides of the sheet."""
+
+    def make(folder: Path) -> LinkFile:
+        bracket = ROOT / "data" / "shells" / "links" / "bracket.toml"
+        return load_link(bracket, changes={f"shell.{key}": value for key, value in changes.items()})
+
+    return Fault(make, words)
+
+
 def moved(mesh: SolidMesh, at: tuple[float, float, float], by: tuple[float, float, float]) -> str:
     """The node nearest to a place, moved."""
     nodes = mesh.nodes.copy()
@@ -114,6 +125,28 @@ def matrices(*words: str, **spoil: Callable[[], bytes]) -> Fault:
     return Fault(lambda folder: written(folder, MARKET, {names[key]: make() for key, make in spoil.items()}), words)
 
 
+def calculix(*words: str, stiffness: Callable[[np.ndarray], np.ndarray]) -> Fault:
+    """The L of 100 hexahedra as CalculiX exported it, the values of its stiffness changed."""
+
+    def make(folder: Path) -> LinkFile:
+        source = ROOT / "data" / "calculix"
+        for path in source.glob("l_hex20.*"):
+            (folder / path.name).write_bytes(path.read_bytes())
+        place = folder / "l_hex20.sti.gz"
+        entries = np.loadtxt(place)
+        lines = zip(*entries[:, :2].T.astype(int).tolist(), stiffness(entries[:, 2]).tolist(), strict=True)
+        place.write_bytes(gzip.compress("".join(f"{i} {j} {v!r}\n" for i, j, v in lines).encode(), 1))
+        return load_link(folder / "l_hex20.toml")
+
+    return Fault(make, words)
+
+
+def without_row(matrix: sp.csc_array, row: int) -> bytes:
+    dense = matrix.toarray()
+    dense[row] = dense[:, row] = 0.0
+    return market(sp.csc_array(dense), "general")
+
+
 def edited(matrix: sp.csc_array, *entries: tuple[int, int, float]) -> bytes:
     """Entries multiplied by a factor, as they stand: nothing else is made symmetric."""
     dense = matrix.toarray()
@@ -160,6 +193,7 @@ def reordered(rows: bytes) -> bytes:
 _, MASS, STIFFNESS = link_matrices()
 K = STIFFNESS.toarray()
 FAR = tuple(int(i) for i in np.argwhere(np.abs(np.triu(K, 1)) > 0.1 * np.abs(K).max())[0])  # a large entry, i < j
+FREE = slice(12, 15)  # rows of a node between the two faces
 COARSE = box("hex8", (4, 2, 2), (0.2, 0.1, 0.1))
 
 FAULTS = {
@@ -170,6 +204,9 @@ FAULTS = {
         "unusual = true",
         frame={"nodes": {k: [1e3 * x for x in p] for k, p in NODES.items()}},
         sections={"s": {"width": 10.0, "height": 20.0}},
+    ),
+    "frame: sections in mm": frame(
+        "thickness per size of the link", "mm read as m", sections={"s": {"width": 10.0, "height": 20.0}}
     ),
     "frame: modulus in MPa": frame("Young's modulus", "MPa", materials={"m": {"youngs_modulus": 7e4}}),
     "frame: density in g/cm3": frame("density", "g/cm³", materials={"m": {"density": 2.7}}),
@@ -247,6 +284,12 @@ FAULTS = {
         reported=True,
         materials={"m": {"poissons_ratio": 0.4999}},
     ),
+    # shells
+    "shell: thickness in mm": shell("thickness per size of the link", "mm read as m", thickness=2.5),
+    "shell: thickness in m, mesh in mm": shell("thickness per size of the link", "m read as mm", thickness=2.5e-6),
+    "shell: normals of both sides": shell(
+        "normals of neighbouring shells point to opposite sides, at 12 edges", "offset", offset=0.001
+    ),
     # matrices
     "matrices: mass in t": matrices(
         "speed of sound in the matrices", "mass in t read as kg", m=lambda: market(1e-3 * MASS)
@@ -255,6 +298,20 @@ FAULTS = {
         "speed of sound in the matrices", "scale of the matrices", k=lambda: market(1e-6 * STIFFNESS)
     ),
     "matrices: K in N/mm": matrices("stiffness in N/mm", k=lambda: market(1e-9 * STIFFNESS)),
+    "matrices: K in N/mm, mass in kg": calculix("stiffness in N/mm", stiffness=lambda v: 1e-3 * v),
+    "matrices: K of six digits": calculix(
+        "by the rounding of its 6 digits",
+        "export the matrices with all digits",
+        stiffness=lambda v: np.array([float(f"{x:.5e}") for x in v]),
+    ),
+    "matrices: a row of K lost": matrices(
+        "1 displacements of nodes have no stiffness", "row 5, uy of node 20", k=lambda: without_row(STIFFNESS, 4)
+    ),
+    "matrices: entries of K lost": matrices(
+        "resists rigid-body motion at nodes ",
+        "entries of these nodes are lost",
+        k=lambda: edited(STIFFNESS, (*FAR, 0.5), (*FAR[::-1], 0.5)),
+    ),
     "matrices: exchanged": matrices(
         "mass and stiffness are exchanged", k=lambda: market(MASS), m=lambda: market(STIFFNESS)
     ),
@@ -322,6 +379,16 @@ def test_faults_are_named(tmp_path: Path, name: str) -> None:
     with pytest.raises(FEImportError) as caught:
         reduce_link(fault.make(tmp_path))
     assert all(word in str(caught.value) for word in fault.words), caught.value
+
+
+def test_nodes_without_mass_are_reported(tmp_path: Path) -> None:
+    """A body moves without the mass of one node, too: nothing is refused, but it is told."""
+    dense = MASS.toarray()
+    dense[FREE] = dense[:, FREE] = 0.0
+    link = written(tmp_path, MARKET, {"m.mtx": market(sp.csc_array(dense), "general")})
+    found = [check for check in reduce_link(link).health if "without mass" in check.name]
+    assert [check.value for check in found] == [1.0]
+    assert "the first at (" in found[0].name
 
 
 SOUND: dict[str, Make] = {
