@@ -19,7 +19,7 @@ from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chose
 from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
-from fe_import.solver.multifrontal import OutsidePattern, negative_pivots
+from fe_import.solver.multifrontal import OutsidePattern, bytes_needed, negative_pivots
 from fe_import.solver.watch import Progress, say
 
 __all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_below", "polishing"]
@@ -107,7 +107,7 @@ def _announced(elimination: Elimination, doing: str, needed: int) -> Progress:
     seconds = elimination.expected_seconds
     if seconds > _ANNOUNCED:
         say(f"{doing}: {len(elimination.order)} dofs, {gigabytes(needed)}, about {seconds:.0f} s")
-    return Progress(doing, elimination.operations)
+    return Progress(doing, float(elimination.operations.sum()))
 
 
 def _canonical(matrix: sp.csc_array) -> sp.csc_array:
@@ -280,6 +280,6 @@ def modes_below(
 
 
 def _count(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, elimination: Elimination) -> int | None:
-    needed = elimination.peak_bytes(keep=False)
+    needed = bytes_needed(elimination, keep=False)
     refuse_too_large(needed, f"count of modes of {stiffness.shape[0]} dofs")
     return negative_pivots(stiffness, elimination, _announced(elimination, "counting modes", needed), mass, shift)
