@@ -76,14 +76,19 @@ def analyse(matrix: sp.csc_array, positions: Array | None = None) -> Elimination
     graph = matrix_graph(matrix)
     number = dissect(graph, None if positions is None else np.asarray(positions, dtype=float)[graph.first])
     vertices = _children_first(number)
-    place = np.empty(len(vertices), dtype=np.int64)
-    place[vertices] = np.arange(len(vertices))
     sorted_number = number[vertices]
     starts = np.flatnonzero(np.diff(sorted_number, prepend=0, append=0))
-    rows, children = _fronts(graph, place, starts)
+    rows, children = _fronts(graph, vertices, starts)
+    sequence = _subtrees_together(children)
+    if (np.diff(sequence) != 1).any():  # a separator that separates nothing is nobody's parent
+        vertices = vertices[_ranges(starts[sequence], starts[sequence + 1])]
+        starts = np.concatenate([[0], np.cumsum(np.diff(starts)[sequence])])
+        rows, children = _fronts(graph, vertices, starts)
 
     # from vertices to dofs
     first = np.concatenate([[0], np.cumsum(np.bincount(graph.vertex)[vertices])])
+    place = np.empty(len(vertices), dtype=np.int64)
+    place[vertices] = np.arange(len(vertices))
     order = np.argsort(place[graph.vertex], kind="stable")
     return Elimination(order, first[starts], tuple(_ranges(first[r], first[r + 1]) for r in rows), children)
 
@@ -95,9 +100,24 @@ def _children_first(number: IntArray) -> IntArray:
     return np.lexsort((np.arange(len(number)), -depth, last))
 
 
-def _fronts(graph: Graph, place: IntArray, starts: IntArray) -> tuple[list[IntArray], tuple[tuple[int, ...], ...]]:
+def _subtrees_together(children: tuple[tuple[int, ...], ...]) -> IntArray:
+    """Fronts in an order in which each comes right after all that are below it."""
+    below = {child for each in children for child in each}
+    waiting = [front for front in range(len(children)) if front not in below]
+    found = []
+    while waiting:
+        found.append(waiting.pop())
+        waiting += children[found[-1]]
+    return np.array(found[::-1], dtype=np.int64)
+
+
+def _fronts(
+    graph: Graph, vertices: IntArray, starts: IntArray
+) -> tuple[list[IntArray], tuple[tuple[int, ...], ...]]:
     """Rows of each front, among the sorted vertices, and its children."""
-    size, count = len(place), len(starts) - 1
+    size, count = len(vertices), len(starts) - 1
+    place = np.empty(size, dtype=np.int64)
+    place[vertices] = np.arange(size)
     front = np.repeat(np.arange(count), np.diff(starts))
     a, b = place[graph.a], place[graph.b]
     lower, upper = np.minimum(a, b), np.maximum(a, b)

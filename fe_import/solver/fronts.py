@@ -96,11 +96,11 @@ def gathered(
 
 @helper
 def too_small(columns: Array, own: int, limit: float, diagonal: Array) -> bool:
-    """Whether a pivot is at most its limit."""
+    """Whether a pivot is at most its limit, or no number."""
+    sound = True
     for j in range(own):
-        if not columns[j, j] ** 2 > limit * diagonal[j]:
-            return True
-    return False
+        sound = sound and columns[j, j] ** 2 > limit * diagonal[j]
+    return not sound
 
 
 @helper

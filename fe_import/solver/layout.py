@@ -19,8 +19,8 @@ from fe_import.model import Array, IntArray
 _SHARE = 16  # pieces that the work is cut into, at least
 _LEAST = 1e8  # operations of a piece worth a thread
 FIRST, ROWS, CHILDREN, PANEL, REST = range(5)
-"""Columns of the table of fronts: its first place, where its rows and its children are listed, where its columns and
-what it leaves to its parent lie in the arrays of its piece. The next front's entries in the first three are the ends."""
+"""Columns of the table of fronts: its first place, where its rows and its children are listed (the next front's entries
+are the ends), where its columns and what it leaves to its parent lie in the arrays of its piece."""
 
 
 @dataclass(frozen=True)
@@ -161,8 +161,8 @@ def lay_out(starts: IntArray, rows: tuple[IntArray, ...], children: tuple[tuple[
         boundary = np.unique(np.concatenate([rows[root] for root in roots]))
         pieces.append(Piece(first, stop, wave, roots, int(panels[-1]), rest_size, boundary))
     flat = np.concatenate([np.zeros(0, dtype=np.int64), *rows])
-    below = np.array([child for each in children for child in each], dtype=np.int64)
-    return Layout(table, flat, below, tuple(pieces), operations)
+    listed = np.array([child for each in children for child in each], dtype=np.int64)
+    return Layout(table, flat, listed, tuple(pieces), operations)
 
 
 def _ranges(operations: Array, parent: IntArray) -> list[tuple[int, int, int]]:

@@ -13,17 +13,17 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import lapack
+from numpy.typing import NDArray
 
 from fe_import.compiled.jit import compiled_before
 from fe_import.model import Array, IntArray
 from fe_import.solver.base import SINGULAR, SingularMatrix
 from fe_import.solver.elimination import Elimination
 from fe_import.solver.layout import CHILDREN, FIRST, ROWS, Layout, Piece
+from fe_import.solver.small import SMALL, TRUSTED, DenseFactor, dense_factor, signed_pivots
 from fe_import.solver.threads import side_by_side, threads
 from fe_import.solver.watch import say
 
-_TRUSTED = 1e-9  # of the diagonal; smaller pivots make the signs of later ones doubtful
 _SLICE = 4e9  # operations between two looks at interrupts
 _WIDE = 2e9  # operations of a front that all threads work on
 _STRIP = 512  # rows or columns that a thread takes of it at a time
@@ -86,7 +86,7 @@ def bytes_needed(elimination: Elimination, keep: bool = True) -> int:
     return elimination.layout.peak_bytes(keep, threads())
 
 
-def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) -> MultifrontalFactor:
+def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) -> MultifrontalFactor | DenseFactor:
     """Cholesky factor of a positive definite matrix.
 
     Raises
@@ -94,6 +94,8 @@ def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) 
     SingularMatrix
         A pivot is not positive, or within rounding of zero.
     """
+    if matrix.shape[0] <= SMALL:
+        return dense_factor(matrix, elimination)
     work = _Work(matrix, elimination, advance, SINGULAR)
     work.run()
     return MultifrontalFactor(elimination, tuple(work.panels))
@@ -133,7 +135,11 @@ def negative_pivots(
     OutsidePattern
         A matrix has entries that the elimination does not foresee.
     """
-    work = _Work(matrix, elimination, advance, _TRUSTED, mass, shift)
+    if matrix.shape[0] <= SMALL:
+        right = np.zeros((matrix.shape[0], 0))
+        found = signed_pivots((matrix - shift * mass).toarray(), right, np.abs(matrix.diagonal()))
+        return None if found is None else found[0]
+    work = _Work(matrix, elimination, advance, TRUSTED, mass, shift)
     try:
         work.run()
     except _Doubtful:
@@ -152,7 +158,7 @@ class _Gathered(NamedTuple):
     rows: IntArray
     below: IntArray
     order: IntArray
-    place: IntArray
+    place: NDArray[np.int32]
     starts: IntArray
     indices: IntArray
     data: Array
@@ -270,15 +276,14 @@ class _Work:
         self._pivots(number, front, columns, rest)
 
     def _pivots(self, number: int, front: int, columns: Array, rest: Array) -> None:
-        own = len(columns)
-        factor, pivots, solved, failed = lapack.dsysv(columns[:, :own].T, columns[:, own:], lower=1)
-        values = _pivot_values(factor, pivots)
-        first = self._layout.table[front, FIRST]
-        if failed > 0 or np.abs(values).min() <= self._limit * self._diagonal[first : first + own].min():
+        own, first = len(columns), self._layout.table[front, FIRST]
+        found = signed_pivots(columns[:, :own].T, columns[:, own:], self._diagonal[first : first + own])
+        if found is None:
             raise _Doubtful
-        self.negative[number] += int((values < 0).sum())
-        if len(rest):
-            rest -= solved.T @ columns[:, own:]
+        self.negative[number] += found[0]
+        taken = found[1].T @ columns[:, own:]
+        for j in range(len(rest)):
+            rest[j, j:] -= taken[j, j:]
 
     def _eliminate_one(self, number: int, panels: Array, rests: Array) -> None:
         """A front whose children are in other pieces."""
@@ -365,16 +370,3 @@ def _flat(matrix: sp.csc_array) -> tuple[IntArray, IntArray, Array]:
         np.ascontiguousarray(matrix.data, dtype=float),
     )
 
-
-def _pivot_values(factor: Array, pivots: IntArray) -> Array:
-    """Eigenvalues of the 1x1 and 2x2 blocks of D in LAPACK's LDLᵀ; both rows of a 2x2 block are marked negative."""
-    values = factor.diagonal().copy()
-    k = 0
-    while k < len(values):
-        if pivots[k] > 0:
-            k += 1
-            continue
-        off = factor[k + 1, k]
-        values[k : k + 2] = np.linalg.eigvalsh([[values[k], off], [off, values[k + 1]]])
-        k += 2
-    return values
