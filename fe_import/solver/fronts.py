@@ -11,13 +11,18 @@ right-hand sides are few.
 
 from __future__ import annotations
 
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
 from fe_import.compiled.jit import helper, kernel
 from fe_import.model import Array, IntArray
 from fe_import.solver.blocks import cholesky, divide, invert, subtract_product, subtract_square
 from fe_import.solver.layout import CHILDREN, FIRST, PANEL, REST, ROWS
 
 BLOCK = 256
-_PLACES = "int32[::1]"
+Places: TypeAlias = NDArray[np.int32]  # 32 bits
 _MATRIX = "int64[::1], int32[::1], float64[::1]"
 _TREE = "int64[:, ::1], int64[::1], int64[::1], int64[::1], int32[::1]"
 _GATHERED = f"{_TREE}, {_MATRIX}, {_MATRIX}, float64"
@@ -26,7 +31,7 @@ _GATHERED = f"{_TREE}, {_MATRIX}, {_MATRIX}, float64"
 @helper
 def gather(
     columns: Array, own: int, factor: float, first: int, begin: int, table_rows: IntArray,
-    order: IntArray, place: IntArray, starts: IntArray, indices: IntArray, data: Array, local: IntArray,
+    order: IntArray, place: Places, starts: IntArray, indices: Places, data: Array, local: Places,
 ) -> bool:  # fmt: skip
     """Add entries of a matrix in the columns of a front, on and below the diagonal; False where one has no place."""
     size = columns.shape[1]
@@ -61,10 +66,10 @@ def extend(columns: Array, rest: Array, own: int, to: IntArray, left: Array, beg
 
 @helper
 def gathered(
-    front: int, children: bool, table: IntArray, rows: IntArray, below: IntArray, order: IntArray, place: IntArray,
-    starts: IntArray, indices: IntArray, data: Array,
-    mass_starts: IntArray, mass_indices: IntArray, mass_data: Array, shift: float,
-    columns: Array, rest: Array, rests: Array, local: IntArray, to: IntArray,
+    front: int, children: bool, table: IntArray, rows: IntArray, below: IntArray, order: IntArray, place: Places,
+    starts: IntArray, indices: Places, data: Array,
+    mass_starts: IntArray, mass_indices: Places, mass_data: Array, shift: float,
+    columns: Array, rest: Array, rests: Array, local: Places, to: IntArray,
 ) -> bool:  # fmt: skip
     """Columns and rest of a front, before it is eliminated; False where an entry has no place."""
     first, begin = table[front, FIRST], table[front, ROWS]
@@ -116,10 +121,10 @@ def invert_blocks(columns: Array, own: int) -> None:
     "int64[::1])"
 )
 def eliminate(
-    front: int, stop: int, table: IntArray, rows: IntArray, below: IntArray, order: IntArray, place: IntArray,
-    starts: IntArray, indices: IntArray, data: Array,
-    mass_starts: IntArray, mass_indices: IntArray, mass_data: Array, shift: float,
-    diagonal: Array, limit: float, keep: bool, panels: Array, rests: Array, local: IntArray, to: IntArray,
+    front: int, stop: int, table: IntArray, rows: IntArray, below: IntArray, order: IntArray, place: Places,
+    starts: IntArray, indices: Places, data: Array,
+    mass_starts: IntArray, mass_indices: Places, mass_data: Array, shift: float,
+    diagonal: Array, limit: float, keep: bool, panels: Array, rests: Array, local: Places, to: IntArray,
 ) -> int:  # fmt: skip
     """Eliminate fronts of a piece in turn.
 
@@ -176,10 +181,10 @@ def eliminate(
 
 @kernel(f"boolean(int64, boolean, {_GATHERED}, float64[:, ::1], float64[:, ::1], float64[::1], int32[::1], int64[::1])")
 def gather_front(
-    front: int, children: bool, table: IntArray, rows: IntArray, below: IntArray, order: IntArray, place: IntArray,
-    starts: IntArray, indices: IntArray, data: Array,
-    mass_starts: IntArray, mass_indices: IntArray, mass_data: Array, shift: float,
-    columns: Array, rest: Array, rests: Array, local: IntArray, to: IntArray,
+    front: int, children: bool, table: IntArray, rows: IntArray, below: IntArray, order: IntArray, place: Places,
+    starts: IntArray, indices: Places, data: Array,
+    mass_starts: IntArray, mass_indices: Places, mass_data: Array, shift: float,
+    columns: Array, rest: Array, rests: Array, local: Places, to: IntArray,
 ) -> bool:  # fmt: skip
     """One front, not eliminated, with what its children in the same piece left over if asked for."""
     return gathered(

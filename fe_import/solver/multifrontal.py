@@ -9,7 +9,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,6 +29,7 @@ _WIDE = 2e9  # operations of a front that all threads work on
 _STRIP = 512  # rows or columns that a thread takes of it at a time
 
 Advance = Callable[[float], None]
+Places: TypeAlias = NDArray[np.int32]
 
 
 class OutsidePattern(Exception):
@@ -158,12 +159,12 @@ class _Gathered(NamedTuple):
     rows: IntArray
     below: IntArray
     order: IntArray
-    place: NDArray[np.int32]
+    place: Places
     starts: IntArray
-    indices: IntArray
+    indices: Places
     data: Array
     mass_starts: IntArray
-    mass_indices: IntArray
+    mass_indices: Places
     mass_data: Array
     shift: float
 
@@ -217,7 +218,7 @@ class _Work:
         if threading.get_ident() == self._main:
             self._advance(self._done)
 
-    def _scratch(self, rows: int) -> tuple[IntArray, IntArray]:
+    def _scratch(self, rows: int) -> tuple[Places, IntArray]:
         """Working memory of this thread."""
         if not hasattr(self._memory, "local"):
             self._memory.local = np.zeros(len(self._diagonal), dtype=np.int32)
@@ -266,7 +267,7 @@ class _Work:
         )
 
     def _indefinite(
-        self, number: int, front: int, panels: Array, rests: Array, local: IntArray, to: IntArray
+        self, number: int, front: int, panels: Array, rests: Array, local: Places, to: IntArray
     ) -> None:
         """A front within a piece that takes pivots of both signs."""
         from fe_import.solver.fronts import gather_front
@@ -362,7 +363,7 @@ def _strips(begin: int, end: int) -> list[tuple[int, int]]:
     return [(low, min(low + _STRIP, end)) for low in range(begin, end, _STRIP)]
 
 
-def _flat(matrix: sp.csc_array) -> tuple[IntArray, IntArray, Array]:
+def _flat(matrix: sp.csc_array) -> tuple[IntArray, Places, Array]:
     """A sparse matrix as kernels take it."""
     return (
         np.ascontiguousarray(matrix.indptr, dtype=np.int64),
