@@ -138,7 +138,9 @@ def _inner(model: FEModel, matrix: sp.csc_array, inner: IntArray) -> sp.csc_arra
     kept = to >= 0
     for column in np.flatnonzero(place < 0):  # few: what follows interfaces
         kept[matrix.indptr[column] : matrix.indptr[column + 1]] = False
-    ends = np.concatenate([[0], np.cumsum(kept, dtype=matrix.indptr.dtype)])[matrix.indptr]
+    ends = np.zeros(len(kept) + 1, dtype=matrix.indptr.dtype)
+    np.cumsum(kept, out=ends[1:])
+    ends = ends[matrix.indptr]
     return sp.csc_array((matrix.data[kept], to[kept], np.append(ends[rows], ends[-1])), shape=(len(rows),) * 2)
 
 
