@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from fe_import.modal.inertia import mass_properties
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.reduction.base import HeldSolution, expanded, interface_places
+from fe_import.solver.products import times
 from fe_import.solver.sparse import Factorization, factorize
 
 
@@ -68,7 +69,7 @@ class Partition:
     def static(self, loads: Array) -> Array:
         """Response of the inner dofs to loads on them, interfaces clamped, with one step of iterative refinement."""
         found = self.solve(loads)
-        return np.asarray(found + self.solve(loads - self.inner_stiffness @ found))
+        return np.asarray(found + self.solve(loads - times(self.inner_stiffness, found)))
 
     @cached_property
     def solve(self) -> Factorization:
@@ -112,7 +113,7 @@ def partition(model: FEModel) -> Partition:
     unit = np.zeros((len(rigid), len(boundary)))
     unit[boundary, np.arange(len(boundary))] = 1.0
     forces, held = (
-        _reduced(model, matrix @ expanded(model, moved))
+        _reduced(model, times(matrix, expanded(model, moved)))
         for matrix, moved in ((model.mass, rigid), (model.stiffness, unit))
     )
     return Partition(

@@ -207,7 +207,9 @@ def take_from_rows(columns: Array, begin: int, end: int, low: int, high: int) ->
 
 @kernel("int64(float64[:, ::1], int64, int64, float64, float64[::1])")
 def factorize_block(columns: Array, begin: int, end: int, limit: float, diagonal: Array) -> int:
-    """Cholesky factor of a diagonal block; not 0 where a pivot is at most its limit."""
+    """Cholesky factor of a diagonal block, zero above it; not 0 where a pivot is at most its limit."""
+    for j in range(begin, end):
+        columns[j, begin:j] = 0.0
     square = columns[begin:end, begin:end]
     return 1 if cholesky(square) != 0 or too_small(square, end - begin, limit, diagonal) else 0
 

@@ -20,6 +20,7 @@ from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
 from fe_import.solver.multifrontal import OutsidePattern, bytes_needed, negative_pivots
+from fe_import.solver.products import times
 from fe_import.solver.watch import Progress, say
 
 __all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_below", "polishing"]
@@ -202,8 +203,8 @@ def _residual(
     are compared first, less their rounding: that takes no solution, and is the larger figure, as rounding in stiff
     parts makes large forces that do little work.
     """
-    force = stiffness @ modes
-    left = force - mass @ modes * values
+    force = times(stiffness, modes)
+    left = force - times(mass, modes) * values
     size = np.linalg.norm(force, axis=0)
     share = np.linalg.norm(left, axis=0) / size
     if share.max() <= _RESIDUAL:
