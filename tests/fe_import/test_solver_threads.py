@@ -46,7 +46,7 @@ def test_pieces_partition_the_fronts(many_pieces: None) -> None:
 
 @pytest.mark.parametrize("mesh", MESHES)
 def test_the_number_of_threads_changes_no_bit(mesh: str, many_pieces: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Solutions, modes and counts with one thread, with two, and with more than there are processors; and right ones."""
+    """Solutions, modes and counts with one thread, two, and more than processors; and that they are right."""
     model = clamped(*MESHES[mesh])
     right = np.random.default_rng(0).standard_normal((model.stiffness.shape[0], 5))
     found: list[tuple[Any, ...]] = []
