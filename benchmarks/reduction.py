@@ -73,6 +73,7 @@ STAGES = [  # name, module, function; a stage within a stage counts for itself o
     ("second order", fe_import.reduce, "second_order"),
     ("health checks", fe_import.reduce, "check_model"),
     ("health checks", fe_import.reduce, "check_basis"),
+    ("health checks", fe_import.reduce, "check_completeness"),
     ("health checks", fe_import.reduce, "check_reduction"),
     ("health checks", fe_import.reduce, "mode_residuals"),
 ]

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.modal.inertia import mass_properties
-from fe_import.model import Array, FEModel, IntArray
+from fe_import.model import Array, FEModel, IntArray, eliminated
 from fe_import.reduction.base import HeldSolution, expanded, interface_places
 from fe_import.solver.products import times
 from fe_import.solver.sparse import Factorization, factorize
@@ -128,21 +128,11 @@ def _reduced(model: FEModel, loads: Array) -> Array:
 
 
 def _inner(model: FEModel, matrix: sp.csc_array, inner: IntArray) -> sp.csc_array:
-    """(i, i) of a matrix over all components: a part of it, where nothing follows inner dofs."""
-    rows, coupling = model.independent[inner], model.coupling
-    if (coupling is not None and (np.diff(coupling.indptr)[inner] != 1).any()) or (np.diff(rows) <= 0).any():
-        own = sp.eye_array(matrix.shape[0], format="csc")[:, rows] if coupling is None else coupling[:, inner]
-        return (own.T @ matrix @ own).tocsc()
-    place = np.full(matrix.shape[0], -1, dtype=matrix.indices.dtype)
-    place[rows] = np.arange(len(rows))
-    to = place[matrix.indices]
-    kept = to >= 0
-    for column in np.flatnonzero(place < 0):  # few: what follows interfaces
-        kept[matrix.indptr[column] : matrix.indptr[column + 1]] = False
-    ends = np.zeros(len(kept) + 1, dtype=matrix.indptr.dtype)
-    np.cumsum(kept, out=ends[1:])
-    ends = ends[matrix.indptr]
-    return sp.csc_array((matrix.data[kept], to[kept], np.append(ends[rows], ends[-1])), shape=(len(rows),) * 2)
+    """(i, i) of a matrix over all components."""
+    coupling = model.coupling
+    if coupling is None:
+        coupling = sp.eye_array(matrix.shape[0], format="csc")[:, model.independent]
+    return eliminated(matrix, coupling[:, inner])
 
 
 def constraint_modes(parts: Partition) -> Array:

@@ -25,9 +25,12 @@ def times(symmetric: Any, fields: Array) -> Array:
     from fe_import.solver.row_products import rows_times
 
     given, result = np.ascontiguousarray(fields, dtype=float), np.empty(fields.shape)
-    starts = symmetric.indptr.astype(np.int64, copy=False)  # of columns, which are those of rows
-    rows = starts, symmetric.indices, symmetric.data
-    side_by_side(lambda ends: rows_times(*ends, *rows, given, result), strips(len(fields)))
+    starts, indices, data = symmetric.indptr.astype(np.int64, copy=False), symmetric.indices, symmetric.data
+
+    def fill(ends: tuple[int, int]) -> None:
+        rows_times(*ends, starts, indices, data, given, result)  # columns, which are those of rows
+
+    side_by_side(fill, strips(len(fields)))
     return result
 
 
