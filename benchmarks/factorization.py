@@ -6,7 +6,7 @@
 The L of `reduction.py`, both ends clamped. Every solver runs in a process of its own, on one matrix, with one thread
 and with two: order of elimination, factor, and a solution of 8 right-hand sides, CPU and wall seconds, the least of the
 repeats. ``--peers`` names the Python of an environment with ``scikit-sparse==0.4.16`` (built with Debian's
-``libsuitesparse-dev`` and ``libopenblas0-pthread``), ``pypardiso`` and ``threadpoolctl``; what it lacks is left out with
+``libsuitesparse-dev``, ``libopenblas0-pthread``), ``pypardiso`` and ``threadpoolctl``; what it lacks is left out with
 the reason. The note says which BLAS ran, and for which processor: ``OPENBLAS_CORETYPE`` in the environment may have
 chosen an older one, which MKL knows nothing of. Of CHOLMOD with METIS, its own nested dissection and AMD the fastest
 counts.
