@@ -302,3 +302,10 @@ def eliminated(matrix: sp.csc_array, coupling: sp.csc_array) -> sp.csc_array:
     ends_of = np.concatenate([row, column[mirrored]]), np.concatenate([column, row[mirrored]])
     values = np.concatenate([products.data, products.data[mirrored]])
     return same + sp.csc_array((values, ends_of), shape=shape)
+
+
+def magnitudes(matrix: sp.csc_array) -> sp.csc_array:
+    """|A| entry by entry, which shares its pattern with A."""
+    import scipy.sparse as sp
+
+    return sp.csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)

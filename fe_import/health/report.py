@@ -205,9 +205,17 @@ def _independent(model: FEModel, forces: Array) -> Array:
 
 
 def _independent_diagonal(model: FEModel) -> Array:
-    if model.coupling is None:
-        return np.asarray(model.stiffness.diagonal())
-    return np.asarray(model.coupling.multiply(model.stiffness @ model.coupling).sum(axis=0)).ravel()
+    """(f,) diagonal of Cᵀ K C; products only for columns of C with several entries."""
+    diagonal, coupling = np.asarray(model.stiffness.diagonal()), model.coupling
+    if coupling is None:
+        return diagonal
+    result = np.zeros(coupling.shape[1])
+    counts = np.diff(coupling.indptr)
+    at = coupling.indptr[:-1][counts == 1]
+    result[counts == 1] = coupling.data[at] ** 2 * diagonal[coupling.indices[at]]
+    several = coupling[:, counts > 1]
+    result[counts > 1] = several.multiply(model.stiffness @ several).sum(axis=0)
+    return result
 
 
 def check_reduction(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
-from fe_import.model import FEModel
+from fe_import.model import FEModel, magnitudes
 
 GROUNDING = 1e-7  # exported matrices carry 6 to 14 digits; a real ground spring is far above
 
@@ -24,7 +24,7 @@ def grounding(model: FEModel) -> float:
     """Largest force that a rigid-body motion causes, relative to the forces of its terms |K| |r|."""
     rigid = model.rigid_body_modes()
     force = np.abs(model.stiffness @ rigid).max(axis=0)
-    terms = (abs(model.stiffness) @ np.abs(rigid)).max(axis=0)
+    terms = (magnitudes(model.stiffness) @ np.abs(rigid)).max(axis=0)
     return float((force / np.where(terms > 0, terms, 1)).max())
 
 

@@ -82,14 +82,14 @@ class Partition:
 
         With f_c = Ψᵀ f at the interfaces that are free, u = Ψ (Ψᵀ K Ψ)⁻¹ f_c + K_ii⁻¹ f_i.
         """
-        model, solve = self.model, self.solve
+        model, solve, inner = self.model, self.solve, self.inner  # and no matrix, which would stay in memory
         fields = expanded(model, constraint)
         stiffness = fields.T @ (model.stiffness @ fields)
 
         def solution(loads: Array, reference: int) -> Array:
             free = np.delete(np.arange(len(stiffness)), np.s_[6 * reference : 6 * reference + 6])
             found = constraint[:, free] @ np.linalg.solve(stiffness[np.ix_(free, free)], constraint[:, free].T @ loads)
-            found[self.inner] += solve(np.ascontiguousarray(loads[self.inner]))
+            found[inner] += solve(np.ascontiguousarray(loads[inner]))
             return np.asarray(found)
 
         return solution

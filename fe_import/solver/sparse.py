@@ -14,7 +14,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.model import Array
+from fe_import.model import Array, magnitudes
 from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chosen_solver
 from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
@@ -209,7 +209,7 @@ def _residual(
     share = np.linalg.norm(left, axis=0) / size
     if share.max() <= _RESIDUAL:
         return float(share.max())
-    rounding = _ROUNDING * np.linalg.norm(abs(stiffness) @ np.abs(modes), axis=0) / size
+    rounding = _ROUNDING * np.linalg.norm(magnitudes(stiffness) @ np.abs(modes), axis=0) / size
     figure = float((share - rounding).max())
     if figure <= _RESIDUAL:
         return figure
