@@ -1,11 +1,11 @@
 """Time and memory of reducing solid links, stage by stage, and side by side with Exudyn.
 
-    python benchmarks/reduction.py [--dofs 10000,50000,150000,400000] [--modes 12,40] [--json FILE]
-    python benchmarks/reduction.py --exudyn [--dofs 136000] [--json FILE]
+    python benchmarks/reduction.py [--dofs 10000,50000,150000,400000] [--modes 12,40] [--threads 1,2] [--json FILE]
+    python benchmarks/reduction.py --exudyn [--dofs 50000,136000] [--threads 1,2] [--json FILE]
 
 An L of legs 0.5 m and section 0.01 m x 0.03 m of hex20, two rigid interfaces (12 dofs). Every case runs in a process
-of its own; times are CPU times, so that a busy machine changes little, memory is the largest so far. Set
-OMP_NUM_THREADS to choose the threads of the linear algebra.
+of its own, with one thread and with two; CPU times change little on a busy machine, wall times say what threads bring
+on an idle one, memory is the largest so far.
 
 With ``--exudyn`` (extra: pip install exudyn==1.13.6), both get the same matrices and find the modes with clamped
 interfaces and the static modes; ours then also counts the modes, to know that none is missing, which Exudyn does not.
@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import functools
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -73,6 +74,7 @@ STAGES = [  # name, module, function; a stage within a stage counts for itself o
     ("second order", fe_import.reduce, "second_order"),
     ("health checks", fe_import.reduce, "check_model"),
     ("health checks", fe_import.reduce, "check_basis"),
+    ("health checks", fe_import.reduce, "check_completeness"),
     ("health checks", fe_import.reduce, "check_reduction"),
     ("health checks", fe_import.reduce, "mode_residuals"),
 ]
@@ -110,13 +112,14 @@ def peak_mb() -> float:
 
 
 class Stages:
-    """CPU time by stage, without the stages within, and the peak of memory at the end of each."""
+    """CPU and wall time by stage, without the stages within, and the peak of memory at the end of each."""
 
     def __init__(self) -> None:
         self.seconds: dict[str, float] = {}
+        self.wall: dict[str, float] = {}
         self.peak_mb: dict[str, float] = {}
         self._running: list[str] = []
-        self._since = time.process_time()
+        self._since = time.process_time(), time.perf_counter()
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
@@ -131,9 +134,10 @@ class Stages:
             self.peak_mb[name] = peak_mb()
 
     def _charge(self) -> None:
-        now = time.process_time()
+        now = time.process_time(), time.perf_counter()
         if self._running:
-            self.seconds[self._running[-1]] = self.seconds.get(self._running[-1], 0.0) + now - self._since
+            for kept, ended, begun in zip((self.seconds, self.wall), now, self._since, strict=True):
+                kept[self._running[-1]] = kept.get(self._running[-1], 0.0) + ended - begun
         self._since = now
 
     def wrap(self, name: str, function: Callable[..., Any]) -> Callable[..., Any]:
@@ -173,7 +177,9 @@ def reduce_case(dofs: int, modes: int) -> dict[str, Any]:
         "cpu_s": time.process_time() - begun,
         "wall_s": time.perf_counter() - wall,
         "peak_mb": peak_mb(),
-        "stages": {s: {"cpu_s": t, "peak_mb": stages.peak_mb[s]} for s, t in stages.seconds.items()},
+        "stages": {
+            s: {"cpu_s": t, "wall_s": stages.wall[s], "peak_mb": stages.peak_mb[s]} for s, t in stages.seconds.items()
+        },
     }
 
 
@@ -250,21 +256,28 @@ def exudyn(dofs: int, modes: int) -> dict[str, Any]:
 CASES: dict[str, Callable[[int, int], dict[str, Any]]] = {"reduce": reduce_case, "ours": ours, "exudyn": exudyn}
 
 
-def in_own_process(case: str, dofs: int, modes: int) -> dict[str, Any]:
+def in_own_process(case: str, dofs: int, modes: int, threads: str) -> dict[str, Any]:
     """The result of a case that runs in a process of its own."""
     command = [sys.executable, __file__, "--case", case, "--dofs", str(dofs), "--modes", str(modes)]
-    lines = subprocess.run(command, stdout=subprocess.PIPE, encoding="utf-8", check=True).stdout.splitlines()
-    return dict(json.loads(lines[-1]))
+    variables = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+    environment = {**os.environ, **dict.fromkeys(variables, threads)}
+    done = subprocess.run(command, stdout=subprocess.PIPE, encoding="utf-8", check=True, env=environment)
+    return {"threads": int(threads), **json.loads(done.stdout.splitlines()[-1])}
 
 
 def print_stages(results: list[dict[str, Any]]) -> None:
-    """One column per case: CPU seconds, peak memory so far."""
+    """One column per case: CPU seconds, wall seconds, peak memory so far."""
     names = list(dict.fromkeys([*(stage for stage, *_ in STAGES), "other", "write"]))
-    print(f"{'':22s}" + "".join(f"{r['dofs']:>13d}/{r['modes']:<3d}" for r in results) + "   dofs/modes")
+    heads = (f"{r['dofs']:>16d}/{r['modes']}/{r['threads']:<3d}" for r in results)
+    print(f"{'':20s}" + "".join(heads) + " dofs/modes/threads")
     for name in names:
         cells = [r["stages"].get(name) for r in results]
-        print(f"{name:22s}" + "".join(f"{c['cpu_s']:8.1f}{c['peak_mb']:9.0f}" if c else " " * 17 for c in cells))
-    print(f"{'all':22s}" + "".join(f"{r['cpu_s']:8.1f}{r['peak_mb']:9.0f}" for r in results) + "   s, MB")
+        print(f"{name:20s}" + "".join(_cell(c) if c else " " * 23 for c in cells))
+    print(f"{'all':20s}" + "".join(map(_cell, results)) + "   CPU s, wall s, MB")
+
+
+def _cell(times: dict[str, Any]) -> str:
+    return f"{times['cpu_s']:8.1f}{times['wall_s']:7.1f}{times['peak_mb']:8.0f}"
 
 
 def main() -> None:
@@ -272,26 +285,30 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--dofs", default="")
     parser.add_argument("--modes", default="")
+    parser.add_argument("--threads", default="1,2")
     parser.add_argument("--exudyn", action="store_true")
     parser.add_argument("--json", type=Path)
     parser.add_argument("--case", choices=CASES, help=argparse.SUPPRESS)
     given = parser.parse_args()
-    dofs = [int(d) for d in (given.dofs or ("136000" if given.exudyn else "10000,50000,150000,400000")).split(",")]
+    usual = "50000,136000" if given.exudyn else "10000,50000,150000,400000"
+    dofs = [int(d) for d in (given.dofs or usual).split(",")]
     modes = [int(m) for m in (given.modes or ("12" if given.exudyn else "12,40")).split(",")]
     if given.case:
         print(json.dumps(CASES[given.case](dofs[0], modes[0])))
         return
     if given.exudyn:
-        results = [in_own_process(case, d, m) for d in dofs for m in modes for case in ("ours", "exudyn")]
-        print("           dofs  CPU [s]  (count)  wall [s]  peak [MB]  (before)  first frequencies [Hz]")
+        cases = [*(("ours", threads) for threads in given.threads.split(",")), ("exudyn", "1")]
+        results = [in_own_process(case, d, m, threads) for d in dofs for m in modes for case, threads in cases]
+        print("           dofs threads  CPU [s]  (count)  wall [s]  peak [MB]  (before)  first frequencies [Hz]")
         for r in results:
             frequencies = "  ".join(f"{f:.3f}" for f in r["frequencies_hz"])
             print(
-                f"{r['program']:8s}{r['dofs']:7d}{r['cpu_s']:9.1f}{r.get('of_which_count_s', 0):9.1f}"
-                f"{r['wall_s']:10.1f}{r['peak_mb']:11.0f}{r['before_mb']:10.0f}  {frequencies}"
+                f"{r['program']:8s}{r['dofs']:7d}{r['threads']:8d}{r['cpu_s']:9.2f}{r.get('of_which_count_s', 0):9.2f}"
+                f"{r['wall_s']:10.2f}{r['peak_mb']:11.0f}{r['before_mb']:10.0f}  {frequencies}"
             )
     else:
-        results = [in_own_process("reduce", d, m) for d in dofs for m in modes]
+        threads = given.threads.split(",")
+        results = [in_own_process("reduce", d, m, number) for d in dofs for m in modes for number in threads]
         for r in results:
             if "refused" in r:
                 print(f"{r['asked_dofs']} dofs, {r['modes']} modes: {r['refused']}")

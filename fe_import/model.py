@@ -262,5 +262,50 @@ class FEModel:
         """Mass and stiffness over the independent dofs, the coupling eliminated."""
         if self.coupling is None:
             return self.mass, self.stiffness
-        c = self.coupling
-        return (c.T @ self.mass @ c).tocsc(), (c.T @ self.stiffness @ c).tocsc()
+        return eliminated(self.mass, self.coupling), eliminated(self.stiffness, self.coupling)
+
+
+def eliminated(matrix: sp.csc_array, coupling: sp.csc_array) -> sp.csc_array:
+    """Cᵀ A C for symmetric A.
+
+    Most columns of C are unit vectors of rows that no other column moves: entries between those are taken over as they
+    are, only the others are products.
+    """
+    import scipy.sparse as sp
+
+    columns = np.flatnonzero(np.diff(coupling.indptr) == 1)
+    at = coupling.indptr[columns]
+    rows = coupling.indices[at]
+    alone = (coupling.data[at] == 1.0) & (np.bincount(coupling.indices)[rows] == 1)
+    columns, rows = columns[alone], rows[alone]
+    others = np.setdiff1d(np.arange(coupling.shape[1]), columns)
+    if 4 * len(others) > len(columns) or (np.diff(rows) <= 0).any():
+        return (coupling.T @ matrix @ coupling).tocsc()
+    kind = matrix.indices.dtype
+    place = np.full(matrix.shape[0], -1, dtype=kind)
+    place[rows] = columns
+    to = place[matrix.indices]
+    kept = to >= 0
+    for row in np.flatnonzero(place < 0):
+        kept[matrix.indptr[row] : matrix.indptr[row + 1]] = False
+    ends = np.zeros(len(kept) + 1, dtype=kind)
+    np.cumsum(kept, out=ends[1:])
+    starts = np.zeros(coupling.shape[1] + 1, dtype=kind)
+    starts[1 + columns] = ends[matrix.indptr[rows + 1]] - ends[matrix.indptr[rows]]
+    shape = (coupling.shape[1],) * 2
+    same = sp.csc_array((matrix.data[kept], to[kept], np.cumsum(starts, dtype=kind)), shape=shape)
+    if not len(others):
+        return same
+    products = sp.coo_array(coupling.T @ (matrix @ coupling[:, others]))
+    row, column = products.coords[0].astype(kind), others[products.coords[1]].astype(kind)
+    mirrored = ~np.isin(row, others)
+    ends_of = np.concatenate([row, column[mirrored]]), np.concatenate([column, row[mirrored]])
+    values = np.concatenate([products.data, products.data[mirrored]])
+    return same + sp.csc_array((values, ends_of), shape=shape)
+
+
+def magnitudes(matrix: sp.csc_array) -> sp.csc_array:
+    """|A| entry by entry, which shares its pattern with A."""
+    import scipy.sparse as sp
+
+    return sp.csc_array((np.abs(matrix.data), matrix.indices, matrix.indptr), shape=matrix.shape)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from fe_import.files.versions import package_version
 from fe_import.health.materials import check_materials
 from fe_import.health.matrix_scale import speed_of_sound
 from fe_import.health.mechanisms import NOT_CLEAR, mechanism
+<<<<<<< HEAD
 from fe_import.health.plausibility import (
     SOUND_IN_CONDENSED,
     SOUND_IN_MATRICES,
@@ -26,6 +28,18 @@ from fe_import.health.plausibility import (
     refuse_slips,
 )
 from fe_import.health.report import RIGID, ROUNDING, check_basis, check_model, check_reduction, mode_residuals
+=======
+from fe_import.health.plausibility import SOUND_IN_MATRICES, plausible_link, plausible_materials, refuse_slips
+from fe_import.health.report import (
+    RIGID,
+    ROUNDING,
+    check_basis,
+    check_completeness,
+    check_model,
+    check_reduction,
+    mode_residuals,
+)
+>>>>>>> b51f8eb2200d8a95c8f71520a3318b6b8fd50a09
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
 from fe_import.health.thickness import plausible_thickness
@@ -107,6 +121,7 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     checks = refuse_slips(checks, unusual, where) + check_model(model, where)
     refuse_slips(_unit_checks(model, np.zeros(0), where), unusual, where)  # named before the work is done
     basis = with_thermal_shape(model, REDUCTIONS[options.method](model, options, where))
+    held, basis = basis.held, replace(basis, held=None)
     mass, stiffness = reduced_matrices(model, basis)
     interfaces, inboard = basis.vectors[model.interface_dofs], _inboard(model, options.inboard)
     modes = orthonormal_modes(mass, stiffness, basis, options, interfaces, where, inboard)
@@ -140,7 +155,9 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
         omega = modes.omega
         reduced_stiffness = np.diag(omega**2)
         damping = damping_ratios(link.description.damping, omega, where)
-        field, statement = second_order(model, shapes, inboard, basis.held)
+        field, statement = second_order(model, shapes, inboard, held)
+    del held  # and the factors with it
+    checks += check_completeness(model, modes.omega)
     rigid = model.rigid_body_modes()
     turning = np.flatnonzero(model.dof_map[:, 3] >= 0)
     return ModalModel(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 
-from erls.maths.address_space import address_space
+from fe_import.compiled.address_space import address_space
 
 LEAST = 3 * 2**28  # bytes; equations are compiled in 0.7 GB, and read from disk in 0.55 GB
 

@@ -33,7 +33,7 @@ from erls.cli.starting import examples, new, schema
 from erls.cli.streams import StdoutLost, prepare_streams
 from erls.cli.studies import study
 from erls.cli.terminal import listen, print_json, tell
-from erls.maths.address_space import address_space
+from fe_import.compiled.address_space import address_space
 from fe_import.errors import ReportedError
 
 app = App(

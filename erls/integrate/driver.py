@@ -16,7 +16,7 @@ from erls.integrate.base import Halved, Leg, Observer, Options, Solution, StopRu
 from erls.integrate.memory import Keeper, Keeping, Memory, Method, taken, unfit
 from erls.integrate.switching import Switch, Switching, switching_of
 from erls.integrate.thinning import thinned
-from erls.maths.address_space import take_buffers
+from fe_import.compiled.address_space import take_buffers
 from erls.maths.so3 import Array
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts

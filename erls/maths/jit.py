@@ -42,7 +42,7 @@ def folder(module: str) -> Path:
     """Folder for the compiled code of this very source: Numba does not notice changes in what a function calls."""
     import numba
 
-    from erls.maths.kernel_cache import FORMAT
+    from fe_import.compiled.kernel_cache import FORMAT
 
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {FORMAT}".encode())
     for name in _reads(module):
@@ -287,7 +287,7 @@ def _njit(function: Any, *signature: Any, cache: bool = True, **options: Any) ->
     from numba.core.typeinfer import register_dispatcher
 
     from erls.maths.compilers import CompilerOfKernels, CompilerOfParts
-    from erls.maths.kernel_cache import KernelCache
+    from fe_import.compiled.kernel_cache import KernelCache
 
     _prepare_numba()
     if signature and not _on_disk(function):

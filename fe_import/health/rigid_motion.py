@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as la
 
-from fe_import.model import Array, FEModel
+from fe_import.model import Array, FEModel, magnitudes
 from fe_import.reduction import Basis
 
 _STRAINED = 1e-13  # strain energy per that of its terms; rounding leaves 1e-16
@@ -69,7 +69,7 @@ def _lengths(model: FEModel) -> Array:
 def _stiffness_scale(model: FEModel, basis: Basis, stiffness: Array, held: Array) -> Array:
     """(k,) scale to unit stiffness; to like displacements of the interface for columns that are rigid-body motions."""
     diagonal, size = np.diag(stiffness), np.abs(basis.vectors)
-    strained = diagonal > _STRAINED * np.einsum("dk,dk->k", size, abs(model.stiffness) @ size)
+    strained = diagonal > _STRAINED * np.einsum("dk,dk->k", size, magnitudes(model.stiffness) @ size)
     scale = np.ones(len(stiffness))
     scale[strained] = 1 / np.sqrt(diagonal[strained])
     reach = np.abs(held).max(axis=0)

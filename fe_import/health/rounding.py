@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from fe_import.errors import FEImportError
-from fe_import.model import FEModel
+from fe_import.model import FEModel, magnitudes
 from fe_import.reduction.rigid_modes import rigid_modes
 
 MOST = 0.1  # the bound; frequencies of solids were off by a hundredth of it
@@ -32,5 +32,5 @@ def rounding_share(model: FEModel, first: float, where: str) -> float:
         rigid = np.abs(rigid_modes(model.mass, model.rigid_body_modes(), where)[0])
     except FEImportError:
         return 0.0
-    energy = np.einsum("dk,dk->k", rigid, abs(model.stiffness) @ rigid)
+    energy = np.einsum("dk,dk->k", rigid, magnitudes(model.stiffness) @ rigid)
     return float(np.finfo(float).eps * energy.max() / first**2)

@@ -50,9 +50,9 @@ class Coupling:
 
     def extended(self, matrix: sp.csc_array) -> sp.csc_array:
         """A matrix of the model over all d nodal components; interface nodes add nothing."""
-        d = self.coupling.shape[0]
-        coo = sp.coo_array(matrix)
-        return sp.csc_array((coo.data, coo.coords), shape=(d, d))
+        d, given = self.coupling.shape[0], sp.csc_array(matrix)
+        ends = np.pad(given.indptr, (0, d - given.shape[0]), mode="edge")
+        return sp.csc_array((given.data, given.indices, ends), shape=(d, d))
 
 
 def couple_interfaces(

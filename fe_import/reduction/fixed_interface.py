@@ -9,8 +9,9 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.modal.inertia import mass_properties
-from fe_import.model import Array, FEModel, IntArray
+from fe_import.model import Array, FEModel, IntArray, eliminated
 from fe_import.reduction.base import HeldSolution, expanded, interface_places
+from fe_import.solver.products import times
 from fe_import.solver.sparse import Factorization, factorize
 
 
@@ -68,7 +69,7 @@ class Partition:
     def static(self, loads: Array) -> Array:
         """Response of the inner dofs to loads on them, interfaces clamped, with one step of iterative refinement."""
         found = self.solve(loads)
-        return np.asarray(found + self.solve(loads - self.inner_stiffness @ found))
+        return np.asarray(found + self.solve(loads - times(self.inner_stiffness, found)))
 
     @cached_property
     def solve(self) -> Factorization:
@@ -81,14 +82,14 @@ class Partition:
 
         With f_c = Ψᵀ f at the interfaces that are free, u = Ψ (Ψᵀ K Ψ)⁻¹ f_c + K_ii⁻¹ f_i.
         """
-        model, solve = self.model, self.solve
+        model, solve, inner = self.model, self.solve, self.inner  # and no matrix, which would stay in memory
         fields = expanded(model, constraint)
         stiffness = fields.T @ (model.stiffness @ fields)
 
         def solution(loads: Array, reference: int) -> Array:
             free = np.delete(np.arange(len(stiffness)), np.s_[6 * reference : 6 * reference + 6])
             found = constraint[:, free] @ np.linalg.solve(stiffness[np.ix_(free, free)], constraint[:, free].T @ loads)
-            found[self.inner] += solve(np.ascontiguousarray(loads[self.inner]))
+            found[inner] += solve(np.ascontiguousarray(loads[inner]))
             return np.asarray(found)
 
         return solution
@@ -112,7 +113,7 @@ def partition(model: FEModel) -> Partition:
     unit = np.zeros((len(rigid), len(boundary)))
     unit[boundary, np.arange(len(boundary))] = 1.0
     forces, held = (
-        _reduced(model, matrix @ expanded(model, moved))
+        _reduced(model, times(matrix, expanded(model, moved)))
         for matrix, moved in ((model.mass, rigid), (model.stiffness, unit))
     )
     return Partition(
@@ -127,19 +128,11 @@ def _reduced(model: FEModel, loads: Array) -> Array:
 
 
 def _inner(model: FEModel, matrix: sp.csc_array, inner: IntArray) -> sp.csc_array:
-    """(i, i) of a matrix over all components: a part of it, where nothing follows inner dofs."""
-    rows, coupling = model.independent[inner], model.coupling
-    if (coupling is not None and (np.diff(coupling.indptr)[inner] != 1).any()) or (np.diff(rows) <= 0).any():
-        own = sp.eye_array(matrix.shape[0], format="csc")[:, rows] if coupling is None else coupling[:, inner]
-        return (own.T @ matrix @ own).tocsc()
-    place = np.full(matrix.shape[0], -1, dtype=matrix.indices.dtype)
-    place[rows] = np.arange(len(rows))
-    to = place[matrix.indices]
-    kept = to >= 0
-    for column in np.flatnonzero(place < 0):  # few: what follows interfaces
-        kept[matrix.indptr[column] : matrix.indptr[column + 1]] = False
-    ends = np.concatenate([[0], np.cumsum(kept, dtype=matrix.indptr.dtype)])[matrix.indptr]
-    return sp.csc_array((matrix.data[kept], to[kept], np.append(ends[rows], ends[-1])), shape=(len(rows),) * 2)
+    """(i, i) of a matrix over all components."""
+    coupling = model.coupling
+    if coupling is None:
+        coupling = sp.eye_array(matrix.shape[0], format="csc")[:, model.independent]
+    return eliminated(matrix, coupling[:, inner])
 
 
 def constraint_modes(parts: Partition) -> Array:

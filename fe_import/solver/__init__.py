@@ -17,7 +17,7 @@ from fe_import.solver.elimination import Elimination, analyse
 SOLVERS: dict[str, Solver] = {
     solver.name: solver
     for solver in (
-        Solver("multifrontal", multifrontal.factorize, Elimination.peak_bytes),
+        Solver("multifrontal", multifrontal.factorize, multifrontal.bytes_needed),
         Solver("superlu", superlu.factorize, superlu.bytes_needed),
         Solver("cholmod", cholmod.factorize, cholmod.bytes_needed, package="scikit-sparse"),
     )

@@ -47,7 +47,7 @@ class Solver:
     name : str
         In files and messages.
     factorize : callable
-        ``(matrix, elimination, advance) -> Factor``; ``advance(front)`` may be called when a front is done.
+        ``(matrix, elimination, advance) -> Factor``; ``advance(done)`` may be told the operations that are done.
     bytes_needed : callable
         ``(elimination) -> int``: memory of the factorization at its largest.
     package : str
@@ -55,6 +55,6 @@ class Solver:
     """
 
     name: str
-    factorize: Callable[[sp.csc_array, Elimination, Callable[[int], None]], Factor]
+    factorize: Callable[[sp.csc_array, Elimination, Callable[[float], None]], Factor]
     bytes_needed: Callable[[Elimination], int]
     package: str = ""

@@ -13,7 +13,7 @@ from fe_import.solver.elimination import Elimination
 from fe_import.solver.superlu import PermutedFactor
 
 
-def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Callable[[int], None]) -> PermutedFactor:
+def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Callable[[float], None]) -> PermutedFactor:
     """Cholesky factor, with the elimination's order, of the matrix scaled to a unit diagonal."""
     from sksparse import cholmod
 

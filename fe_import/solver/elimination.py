@@ -8,6 +8,7 @@ of the multifrontal factorization to the last number, not estimates.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -15,6 +16,7 @@ import scipy.sparse as sp
 from fe_import.model import Array, IntArray
 from fe_import.solver.dissection import dissect
 from fe_import.solver.graph import Graph, matrix_graph
+from fe_import.solver.layout import Layout, lay_out
 
 
 @dataclass(frozen=True)
@@ -38,39 +40,27 @@ class Elimination:
     rows: tuple[IntArray, ...]
     children: tuple[tuple[int, ...], ...]
 
-    @property
-    def _sizes(self) -> tuple[Array, Array]:
-        """Own dofs and rows of each front."""
-        return np.diff(self.starts).astype(float), np.array([len(r) for r in self.rows], dtype=float)
+    @cached_property
+    def layout(self) -> Layout:
+        """Where numbers lie, and what is eliminated side by side."""
+        return lay_out(self.starts, self.rows, self.children)
 
     @property
     def nonzeros(self) -> int:
         """Entries of the lower triangular factor."""
-        own, rows = self._sizes
-        return int((own * (own + 1) / 2 + own * rows).sum())
+        own, across = self.layout.own, self.layout.across
+        return int((own * (own + 1) // 2 + own * across).sum())
 
     @property
     def operations(self) -> Array:
         """(f,) multiplications and additions that each front takes in a Cholesky factorization."""
-        own, rows = self._sizes
-        return np.asarray(own**3 / 3 + own**2 * rows + own * rows**2)
+        return self.layout.operations
 
     @property
     def expected_seconds(self) -> float:
         """Of a factorization, on one core of 2023 (30 operations and 0.12 added entries per nanosecond); machines and
         their load differ by a factor of three."""
-        return float(self.operations.sum() / 3e10 + (self._sizes[1] ** 2).sum() / 1.2e8)
-
-    def peak_bytes(self, keep: bool = True) -> int:
-        """Memory of the factorization at its largest, the factor included unless it is not kept."""
-        own, rows = self._sizes
-        stored = np.cumsum(own * (own + rows)) if keep else np.zeros(len(own))
-        waiting, peak = 0.0, 0.0
-        for front, children in enumerate(self.children):
-            working = 2 * own[front] * (own[front] + rows[front]) + rows[front] ** 2
-            peak = max(peak, waiting + working + (stored[front - 1] if front else 0.0))
-            waiting += rows[front] ** 2 - sum(rows[child] ** 2 for child in children)
-        return int(8 * max(peak, stored[-1] if len(stored) else 0.0))
+        return float(self.operations.sum() / 3e10 + (self.layout.across.astype(float) ** 2).sum() / 1.2e8)
 
 
 def analyse(matrix: sp.csc_array, positions: Array | None = None) -> Elimination:
@@ -86,14 +76,19 @@ def analyse(matrix: sp.csc_array, positions: Array | None = None) -> Elimination
     graph = matrix_graph(matrix)
     number = dissect(graph, None if positions is None else np.asarray(positions, dtype=float)[graph.first])
     vertices = _children_first(number)
-    place = np.empty(len(vertices), dtype=np.int64)
-    place[vertices] = np.arange(len(vertices))
     sorted_number = number[vertices]
     starts = np.flatnonzero(np.diff(sorted_number, prepend=0, append=0))
-    rows, children = _fronts(graph, place, starts)
+    rows, children = _fronts(graph, vertices, starts)
+    sequence = _subtrees_together(children)
+    if (np.diff(sequence) != 1).any():  # a separator that separates nothing is nobody's parent
+        vertices = vertices[_ranges(starts[sequence], starts[sequence + 1])]
+        starts = np.concatenate([[0], np.cumsum(np.diff(starts)[sequence])])
+        rows, children = _fronts(graph, vertices, starts)
 
     # from vertices to dofs
     first = np.concatenate([[0], np.cumsum(np.bincount(graph.vertex)[vertices])])
+    place = np.empty(len(vertices), dtype=np.int64)
+    place[vertices] = np.arange(len(vertices))
     order = np.argsort(place[graph.vertex], kind="stable")
     return Elimination(order, first[starts], tuple(_ranges(first[r], first[r + 1]) for r in rows), children)
 
@@ -105,9 +100,24 @@ def _children_first(number: IntArray) -> IntArray:
     return np.lexsort((np.arange(len(number)), -depth, last))
 
 
-def _fronts(graph: Graph, place: IntArray, starts: IntArray) -> tuple[list[IntArray], tuple[tuple[int, ...], ...]]:
+def _subtrees_together(children: tuple[tuple[int, ...], ...]) -> IntArray:
+    """Fronts in an order in which each comes right after all that are below it."""
+    below = {child for each in children for child in each}
+    waiting = [front for front in range(len(children)) if front not in below]
+    found = []
+    while waiting:
+        found.append(waiting.pop())
+        waiting += children[found[-1]]
+    return np.array(found[::-1], dtype=np.int64)
+
+
+def _fronts(
+    graph: Graph, vertices: IntArray, starts: IntArray
+) -> tuple[list[IntArray], tuple[tuple[int, ...], ...]]:
     """Rows of each front, among the sorted vertices, and its children."""
-    size, count = len(place), len(starts) - 1
+    size, count = len(vertices), len(starts) - 1
+    place = np.empty(size, dtype=np.int64)
+    place[vertices] = np.arange(size)
     front = np.repeat(np.arange(count), np.diff(starts))
     a, b = place[graph.a], place[graph.b]
     lower, upper = np.minimum(a, b), np.maximum(a, b)

@@ -15,6 +15,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from fe_import.model import Array
+from fe_import.solver import products
 
 _CONVERGED = 1e-9  # error of A φ = μ φ, per μ, in the mass norm
 _NEW = 1e-10  # part of a vector that is new, per its size; below is rounding
@@ -80,10 +81,7 @@ def lowest_eigenpairs(solve: Callable[[Array], Array], mass: sp.csc_array, count
     mu, turn, left = mu[:count][needed], turn[:, :count][:, needed], left[:, needed]
     # A φ / μ instead of φ costs nothing and is free of what rounding mixed in
     modes = new @ (left / mu)
-    row = 0
-    for block in blocks:
-        modes += block @ turn[row : row + block.shape[1]]
-        row += block.shape[1]
+    products.take_out(modes, blocks, -turn)
     return mu, modes
 
 
@@ -103,17 +101,14 @@ def _orthonormal(vectors: Array, blocks: list[Array], mass: sp.csc_array) -> tup
     """
     along = np.zeros((sum(block.shape[1] for block in blocks), vectors.shape[1]))
     across = np.eye(vectors.shape[1])
-    new, weighted = vectors, mass @ vectors
+    new, weighted = vectors, products.times(mass, vectors)
     least = _NEW * np.sqrt(np.einsum("nk,nk->k", new, weighted).max().clip(min=0))
     for _ in range(2):  # twice is enough
         if blocks:
-            part = np.concatenate([block.T @ weighted for block in blocks])
-            row = 0
-            for block in blocks:
-                new -= block @ part[row : row + block.shape[1]]
-                row += block.shape[1]
+            part = products.along(blocks, weighted)
+            products.take_out(new, blocks, part)
             along += part @ across
-            weighted = mass @ new
+            weighted = products.times(mass, new)
         gram = new.T @ weighted
         values, turn = la.eigh((gram + gram.T) / 2)
         size = np.sqrt(values.clip(min=0))

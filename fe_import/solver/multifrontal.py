@@ -1,28 +1,35 @@
-"""Multifrontal factorization: every front is a small dense matrix that LAPACK factorizes.
+"""Multifrontal Cholesky factors and counts of negative pivots, pieces of the tree of fronts side by side.
 
-A front gathers the entries of its own dofs and what eliminating its children left over for it, factorizes the own
-part, and leaves a matrix over its rows to its parent (I. S. Duff & J. K. Reid, ACM Trans. Math. Software 9, 1983;
-J. W. H. Liu, SIAM Review 34, 1992). Only lower triangles are meant.
+What a piece is, is told in `fe_import.solver.layout`; what happens to a front, in `fe_import.solver.fronts`. Every sum
+is taken in the same order whatever the number of threads: results are the same to the last bit.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import threading
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple, TypeAlias
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import blas, lapack
-from scipy.sparse._sparsetools import csr_todense  # adds to what is there; nothing public does that in one pass
+from numpy.typing import NDArray
 
+from fe_import.compiled.jit import compiled_before
 from fe_import.model import Array, IntArray
 from fe_import.solver.base import SINGULAR, SingularMatrix
 from fe_import.solver.elimination import Elimination
+from fe_import.solver.layout import CHILDREN, FIRST, ROWS, Layout, Piece
+from fe_import.solver.small import SMALL, TRUSTED, DenseFactor, dense_factor, signed_pivots
+from fe_import.solver.threads import side_by_side, threads
+from fe_import.solver.watch import say
 
-_ADDED = 200_000  # entries of a child added at a time
-_TRUSTED = 1e-9  # of the diagonal; smaller pivots make the signs of later ones doubtful
+_SLICE = 4e9  # operations between two looks at interrupts
+_WIDE = 2e9  # operations of a front that all threads work on
+_STRIP = 512  # rows or columns that a thread takes of it at a time
 
-Advance = Callable[[int], None]
+Advance = Callable[[float], None]
+Places: TypeAlias = NDArray[np.int32]
 
 
 class OutsidePattern(Exception):
@@ -31,41 +38,56 @@ class OutsidePattern(Exception):
 
 @dataclass(frozen=True)
 class MultifrontalFactor:
-    """Cholesky factor of a positive definite matrix, front by front.
+    """Cholesky factor of a positive definite matrix, piece by piece.
 
     Attributes
     ----------
     elimination : Elimination
-    inverses : tuple of (o, o) arrays
-        Inverse triangles: a product is faster than a substitution where right-hand sides are few.
-    rectangles : tuple of (r, o) arrays
-        What is below the triangles.
+    panels : tuple of arrays
+        Columns of the fronts of each piece.
     """
 
     elimination: Elimination
-    inverses: tuple[Array, ...]
-    rectangles: tuple[Array, ...]
+    panels: tuple[Array, ...]
 
     def solve(self, right: Array) -> Array:
         """(n, k) or (n,) solutions."""
-        order, starts, rows = self.elimination.order, self.elimination.starts, self.elimination.rows
-        x = np.ascontiguousarray(right[order].reshape(len(order), -1), dtype=float)
-        for k, row in enumerate(rows):
-            own = x[starts[k] : starts[k + 1]]
-            own[:] = self.inverses[k] @ own
-            if len(row):
-                x[row] -= self.rectangles[k] @ own
-        for k in reversed(range(len(rows))):
-            own = x[starts[k] : starts[k + 1]]
-            if len(rows[k]):
-                own -= self.rectangles[k].T @ x[rows[k]]
-            own[:] = self.inverses[k].T @ own
-        result = np.empty_like(x)
-        result[order] = x
+        from fe_import.solver.substitution import backward, forward
+
+        layout, order = self.elimination.layout, self.elimination.order
+        rows, begin = layout.spread
+        columns = right.reshape(len(order), -1)
+        x = np.zeros((begin[-1], columns.shape[1]))
+        x[: len(order)] = columns[order]
+
+        def beyond(number: int) -> Array:
+            return x[begin[number] : begin[number + 1]]
+
+        def substitute(kernel: Callable[..., None], number: int) -> None:
+            piece = layout.pieces[number]
+            own, across = layout.own[piece.first : piece.stop], layout.across[piece.first : piece.stop]
+            memory = np.empty((max(int(own.max()), int(across.max())), x.shape[1]))
+            kernel(piece.first, piece.stop, layout.table, rows, self.panels[number], x, memory)
+
+        for wave in layout.waves:
+            side_by_side(lambda number: substitute(forward, number), wave)
+            for number in sorted(wave):
+                x[layout.pieces[number].boundary] += beyond(number)
+        for wave in reversed(layout.waves):
+            for number in wave:
+                beyond(number)[:] = x[layout.pieces[number].boundary]
+            side_by_side(lambda number: substitute(backward, number), wave)
+        result = np.empty_like(columns, dtype=float)
+        result[order] = x[: len(order)]
         return result.reshape(right.shape)
 
 
-def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) -> MultifrontalFactor:
+def bytes_needed(elimination: Elimination, keep: bool = True) -> int:
+    """Memory of an elimination at its largest, the factor included unless it is not kept."""
+    return elimination.layout.peak_bytes(keep, threads())
+
+
+def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) -> MultifrontalFactor | DenseFactor:
     """Cholesky factor of a positive definite matrix.
 
     Raises
@@ -73,21 +95,11 @@ def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Advance) 
     SingularMatrix
         A pivot is not positive, or within rounding of zero.
     """
-    diagonal = np.abs(matrix.diagonal())[elimination.order]
-    fronts = _Fronts([(matrix, 1.0)], elimination)
-    inverses, rectangles = [], []
-    for k, own, across in fronts:
-        triangle, failed = lapack.dpotrf(own, lower=1, clean=1)
-        scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
-        if failed or (triangle.diagonal() ** 2 <= SINGULAR * scale).any():
-            raise SingularMatrix
-        if len(across):
-            across = blas.dtrsm(1.0, triangle, across, side=1, lower=1, trans_a=1, overwrite_b=1)
-            fronts.eliminate_squared(k, across)
-        inverses.append(lapack.dtrtri(triangle, lower=1, overwrite_c=1)[0])
-        rectangles.append(across)
-        advance(k)
-    return MultifrontalFactor(elimination, tuple(inverses), tuple(rectangles))
+    if matrix.shape[0] <= SMALL:
+        return dense_factor(matrix, elimination)
+    work = _Work(matrix, elimination, advance, SINGULAR)
+    work.run()
+    return MultifrontalFactor(elimination, tuple(work.panels))
 
 
 def negative_pivots(
@@ -108,7 +120,7 @@ def negative_pivots(
         K.
     elimination : Elimination
     advance : callable
-        Told every front that is done.
+        Told the operations of what is done.
     mass : (n, n) sparse CSC
         M.
     shift : float
@@ -124,109 +136,238 @@ def negative_pivots(
     OutsidePattern
         A matrix has entries that the elimination does not foresee.
     """
-    diagonal = np.abs(matrix.diagonal())[elimination.order]
-    fronts = _Fronts([(matrix, 1.0), (mass, -shift)], elimination)
-    count = 0
-    for k, own, across in fronts:
-        scale = diagonal[elimination.starts[k] : elimination.starts[k + 1]]
-        triangle, failed = lapack.dpotrf(own, lower=1, clean=0)
-        if not failed and (triangle.diagonal() ** 2 > _TRUSTED * scale).all():
-            if len(across):
-                across = blas.dtrsm(1.0, triangle, across, side=1, lower=1, trans_a=1, overwrite_b=1)
-                fronts.eliminate_squared(k, across)
-        else:
-            factor, pivots, solved, failed = lapack.dsysv(own, across.T, lower=1)
-            values = _pivot_values(factor, pivots)
-            if failed > 0 or np.abs(values).min() <= _TRUSTED * scale.min():
-                return None
-            count += int((values < 0).sum())
-            fronts.eliminate(k, across, solved)
-        advance(k)
-    return count
+    if matrix.shape[0] <= SMALL:
+        right = np.zeros((matrix.shape[0], 0))
+        found = signed_pivots((matrix - shift * mass).toarray(), right, np.abs(matrix.diagonal()))
+        return None if found is None else found[0]
+    work = _Work(matrix, elimination, advance, TRUSTED, mass, shift)
+    try:
+        work.run()
+    except _Doubtful:
+        return None
+    return sum(work.negative)
 
 
-def _pivot_values(factor: Array, pivots: IntArray) -> Array:
-    """Eigenvalues of the 1x1 and 2x2 blocks of D in LAPACK's LDLᵀ; both rows of a 2x2 block are marked negative."""
-    values = factor.diagonal().copy()
-    k = 0
-    while k < len(values):
-        if pivots[k] > 0:
-            k += 1
-            continue
-        off = factor[k + 1, k]
-        values[k : k + 2] = np.linalg.eigvalsh([[values[k], off], [off, values[k + 1]]])
-        k += 2
-    return values
+class _Doubtful(Exception):
+    """A pivot is too small to trust its sign."""
 
 
-class _Fronts:
-    """Iterates over the fronts of a sum of matrices, each front gathered: number, own part (o, o), part across (r, o).
-    One must be eliminated before the next is asked for."""
+class _Gathered(NamedTuple):
+    """Of the tree and the matrices, as kernels take them."""
 
-    def __init__(self, terms: Sequence[tuple[sp.csc_array, float]], elimination: Elimination) -> None:
-        self._terms, self._elimination = terms, elimination
+    table: IntArray
+    rows: IntArray
+    below: IntArray
+    order: IntArray
+    place: Places
+    starts: IntArray
+    indices: Places
+    data: Array
+    mass_starts: IntArray
+    mass_indices: Places
+    mass_data: Array
+    shift: float
+
+
+class _Work:
+    """One elimination of K, or K - λM of which signs are counted."""
+
+    def __init__(
+        self,
+        matrix: sp.csc_array,
+        elimination: Elimination,
+        advance: Advance,
+        limit: float,
+        mass: sp.csc_array | None = None,
+        shift: float = 0.0,
+    ) -> None:
+        if not compiled_before(__package__ or ""):
+            say("compiling the sparse solver (once on this machine)")
+        self._layout: Layout = elimination.layout
+        self._advance, self._limit, self._keep = advance, limit, mass is None
         count = len(elimination.order)
-        self._place = np.empty(count, dtype=np.int64)
-        self._place[elimination.order] = np.arange(count)
-        self._local = np.empty(count, dtype=np.int64)
+        place = np.empty(count, dtype=np.int32)
+        place[elimination.order] = np.arange(count)
+        nothing = sp.csc_array((count, count))
+        self._gathered = _Gathered(
+            self._layout.table, self._layout.rows, self._layout.children, elimination.order, place,
+            *_flat(matrix), *_flat(nothing if mass is None else mass), shift,
+        )  # fmt: skip
+        self._diagonal = np.abs(matrix.diagonal())[elimination.order]
         self._left: dict[int, Array] = {}
-        self._rest = np.zeros((0, 0))
+        self._memory = threading.local()
+        self._done, self._lock, self._main = 0.0, threading.Lock(), threading.get_ident()
+        self.panels: list[Array] = [np.zeros(0)] * len(self._layout.pieces)
+        self.negative: list[int] = [0] * len(self._layout.pieces)
 
-    def __iter__(self) -> Iterator[tuple[int, Array, Array]]:
-        starts = self._elimination.starts
-        owner = np.full(len(self._place), -1)
-        for k, row in enumerate(self._elimination.rows):
-            own, size = starts[k + 1] - starts[k], starts[k + 1] - starts[k] + len(row)
-            self._local[starts[k] : starts[k + 1]] = np.arange(own)
-            self._local[row] = np.arange(own, size)
-            owner[starts[k] : starts[k + 1]] = owner[row] = k
-            front = np.zeros((size, own), order="F")
-            for matrix, factor in self._terms:
-                self._gather(matrix, factor, front, owner, k)
-            self._rest = np.zeros((len(row), len(row)), order="F")
-            for child in self._elimination.children[k]:
-                self._extend(front, self._local[self._elimination.rows[child]], self._left.pop(child))
-            yield k, front[:own], np.asfortranarray(front[own:])
+    def run(self) -> None:
+        """Eliminate all pieces."""
+        for wave in self._layout.waves:
+            wide = [number for number in wave if self._is_wide(self._layout.pieces[number])]
+            side_by_side(self._eliminate, [number for number in wave if number not in wide])
+            for number in sorted(wide):
+                self._eliminate(number)
 
-    def _gather(self, matrix: sp.csc_array, factor: float, front: Array, owner: IntArray, k: int) -> None:
-        """Add entries of a matrix in the columns of a front, from its own rows on."""
-        first, last = self._elimination.starts[k], self._elimination.starts[k + 1]
-        columns = self._elimination.order[first:last]
-        begin = matrix.indptr[columns].astype(np.int64)
-        counts = matrix.indptr[columns + 1] - begin
-        ends = np.cumsum(counts)
-        at = np.arange(ends[-1]) + np.repeat(begin - ends + counts, counts)
-        row = self._place[matrix.indices[at]]
-        later = row >= first
-        row = row[later]
-        if (owner[row] != k).any():
+    def _is_wide(self, piece: Piece) -> bool:
+        return self._keep and piece.stop == piece.first + 1 and self._layout.operations[piece.first] > _WIDE
+
+    def _told(self, first: int, stop: int) -> None:
+        """Count what is done; listeners are told in the thread that asked."""
+        with self._lock:
+            self._done += float(self._layout.operations[first:stop].sum())
+        if threading.get_ident() == self._main:
+            self._advance(self._done)
+
+    def _scratch(self, rows: int) -> tuple[Places, IntArray]:
+        """Working memory of this thread."""
+        if not hasattr(self._memory, "local"):
+            self._memory.local = np.zeros(len(self._diagonal), dtype=np.int32)
+        return self._memory.local, np.empty(rows, dtype=np.int64)
+
+    def _eliminate(self, number: int) -> None:
+        from fe_import.solver.fronts import eliminate
+
+        layout, piece = self._layout, self._layout.pieces[number]
+        own, across = layout.own[piece.first : piece.stop], layout.across[piece.first : piece.stop]
+        panels = np.empty(piece.panel_size if self._keep else int((own * (own + across)).max()))
+        rests = np.empty(piece.rest_size)
+        local, to = self._scratch(int(across.max(initial=0)))
+        if piece.wave:
+            self._eliminate_one(number, panels, rests)
+        else:
+            front = piece.first
+            while front < piece.stop:
+                done = np.cumsum(layout.operations[front : piece.stop])
+                stop = front + max(1, int(np.searchsorted(done, _SLICE)))
+                begun, front = front, eliminate(
+                    front, stop, *self._gathered, self._diagonal, self._limit, self._keep, panels, rests, local, to
+                )  # fmt: skip
+                if front < 0:
+                    raise OutsidePattern
+                if front < stop:
+                    if self._keep:
+                        raise SingularMatrix
+                    self._indefinite(number, front, panels, rests, local, to)
+                    front += 1
+                self._told(begun, front)
+        for root in piece.roots:
+            size, at = int(layout.across[root]), int(layout.table[root, -1])
+            if size:
+                left = rests[at : at + size * size].reshape(size, size)
+                self._left[root] = left if piece.wave else left.copy()
+        if self._keep:
+            self.panels[number] = panels
+
+    def _views(self, front: int, panels: Array, rests: Array) -> tuple[Array, Array]:
+        own, across = int(self._layout.own[front]), int(self._layout.across[front])
+        at = int(self._layout.table[front, -1])
+        return (
+            panels[: own * (own + across)].reshape(own, own + across),
+            rests[at : at + across * across].reshape(across, across),
+        )
+
+    def _indefinite(
+        self, number: int, front: int, panels: Array, rests: Array, local: Places, to: IntArray
+    ) -> None:
+        """A front within a piece that takes pivots of both signs."""
+        from fe_import.solver.fronts import gather_front
+
+        columns, rest = self._views(front, panels, rests)
+        gather_front(front, True, *self._gathered, columns, rest, rests, local, to)
+        self._pivots(number, front, columns, rest)
+
+    def _pivots(self, number: int, front: int, columns: Array, rest: Array) -> None:
+        own, first = len(columns), self._layout.table[front, FIRST]
+        found = signed_pivots(columns[:, :own].T, columns[:, own:], self._diagonal[first : first + own])
+        if found is None:
+            raise _Doubtful
+        self.negative[number] += found[0]
+        taken = found[1].T @ columns[:, own:]
+        for j in range(len(rest)):
+            rest[j, j:] -= taken[j, j:]
+
+    def _eliminate_one(self, number: int, panels: Array, rests: Array) -> None:
+        """A front whose children are in other pieces."""
+        from fe_import.solver import fronts
+
+        front = self._layout.pieces[number].first
+        columns, rest = self._views(front, panels, rests)
+        wide = self._is_wide(self._layout.pieces[number])
+        self._gather(front, columns, rest, wide)
+        own, first = len(columns), int(self._layout.table[front, FIRST])
+        diagonal = self._diagonal[first:]
+        if wide:
+            self._eliminate_wide(columns, rest, diagonal)
+        elif fronts.factorize_block(columns, 0, own, self._limit, diagonal):
+            if self._keep:
+                raise SingularMatrix
+            self._gather(front, columns, rest, wide)
+            self._pivots(number, front, columns, rest)
+        elif len(rest):
+            fronts.divide_rows(columns, 0, own, own, own + len(rest))
+            fronts.take_from_rest(rest, columns, own, 0, len(rest))
+        if self._keep:
+            fronts.invert_front(columns, own)
+        for child in self._children(front):
+            self._left.pop(child, None)
+        self._told(front, front + 1)
+
+    def _children(self, front: int) -> list[int]:
+        table = self._layout.table
+        return list(map(int, self._layout.children[table[front, CHILDREN] : table[front + 1, CHILDREN]]))
+
+    def _gather(self, front: int, columns: Array, rest: Array, wide: bool) -> None:
+        from fe_import.solver.fronts import extend_front, gather_front
+
+        table, own = self._layout.table, len(columns)
+        rows = self._layout.rows[table[front, ROWS] : table[front + 1, ROWS]]
+        local, to = self._scratch(len(rows))
+        if not gather_front(front, False, *self._gathered, columns, rest, np.zeros(0), local, to):
             raise OutsidePattern
-        to = self._local[row] + np.repeat(np.arange(last - first) * len(front), counts)[later]
-        front.T.reshape(-1)[to] += factor * matrix.data[at[later]]
+        for child in self._children(front):
+            if child not in self._left:
+                continue
+            left = self._left[child]
+            to = local[self._layout.rows[table[child, ROWS] : table[child + 1, ROWS]]].astype(np.int64)
+            if wide:
+                side_by_side(
+                    lambda ends: extend_front(columns, rest, own, to, left, *ends),  # noqa: B023
+                    _strips(0, len(left)),
+                )
+            else:
+                extend_front(columns, rest, own, to, left, 0, len(left))
 
-    def _extend(self, front: Array, to: IntArray, left: Array) -> None:
-        """Add what a child left over; rows rise, so lower triangles stay lower triangles."""
-        own = front.shape[1]
-        inner, rows = int(np.searchsorted(to, own)), to.astype(np.int32)
-        for target, begin, end, shift in ((front, 0, inner, 0), (self._rest, inner, len(to), own)):
-            height, many = len(target), len(to) - begin
-            step = max(1, _ADDED // max(1, many))
-            for first in range(begin, end, step):
-                # columns of the child are rows of a sparse matrix, whose entries go where its columns say
-                stop = min(first + step, end)
-                columns = to[first:stop] - shift
-                part = target.T[columns[0] : columns[-1] + 1]
-                starts = np.zeros(len(part) + 1, dtype=np.int32)
-                starts[columns - columns[0] + 1] = many
-                np.cumsum(starts, out=starts)
-                places = np.tile(rows[begin:] - shift, stop - first)
-                csr_todense(len(part), height, starts, places, left.T[first:stop, begin:].reshape(-1), part)
+    def _eliminate_wide(self, columns: Array, rest: Array, diagonal: Array) -> None:
+        """One front by all threads, in strips that are the same whatever their number."""
+        from fe_import.solver import fronts
 
-    def eliminate_squared(self, front: int, across: Array) -> None:
-        """Leave rest - across acrossᵀ to the parent."""
-        self._left[front] = blas.dsyrk(-1.0, across, beta=1.0, c=self._rest, lower=1, overwrite_c=1)
+        own, size = columns.shape
+        for begin in range(0, own, fronts.BLOCK):
+            end = min(begin + fronts.BLOCK, own)
+            if begin:
+                side_by_side(
+                    lambda ends: fronts.take_from_rows(columns, begin, end, *ends),  # noqa: B023
+                    _strips(begin, size),
+                )
+            if fronts.factorize_block(columns, begin, end, self._limit, diagonal[begin:]):
+                raise SingularMatrix
+            side_by_side(
+                lambda ends: fronts.divide_rows(columns, begin, end, *ends),  # noqa: B023
+                _strips(end, size),
+            )
+        side_by_side(lambda ends: fronts.take_from_rest(rest, columns, own, *ends), _strips(0, len(rest)))
 
-    def eliminate(self, front: int, across: Array, solved: Array) -> None:
-        """Leave rest - across solved to the parent."""
-        if len(across):
-            self._left[front] = blas.dgemm(-1.0, across, solved, beta=1.0, c=self._rest, overwrite_c=1)
+
+def _strips(begin: int, end: int) -> list[tuple[int, int]]:
+    """Ranges of rows or columns."""
+    return [(low, min(low + _STRIP, end)) for low in range(begin, end, _STRIP)]
+
+
+def _flat(matrix: sp.csc_array) -> tuple[IntArray, Places, Array]:
+    """A sparse matrix as kernels take it."""
+    return (
+        np.ascontiguousarray(matrix.indptr, dtype=np.int64),
+        np.ascontiguousarray(matrix.indices, dtype=np.int32),
+        np.ascontiguousarray(matrix.data, dtype=float),
+    )
+

@@ -14,12 +14,13 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.errors import Cause, FEImportError
-from fe_import.model import Array
+from fe_import.model import Array, magnitudes
 from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chosen_solver
 from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
-from fe_import.solver.multifrontal import OutsidePattern, negative_pivots
+from fe_import.solver.multifrontal import OutsidePattern, bytes_needed, negative_pivots
+from fe_import.solver.products import times
 from fe_import.solver.watch import Progress, say
 
 __all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_below", "polishing"]
@@ -107,7 +108,7 @@ def _announced(elimination: Elimination, doing: str, needed: int) -> Progress:
     seconds = elimination.expected_seconds
     if seconds > _ANNOUNCED:
         say(f"{doing}: {len(elimination.order)} dofs, {gigabytes(needed)}, about {seconds:.0f} s")
-    return Progress(doing, elimination.operations)
+    return Progress(doing, float(elimination.operations.sum()))
 
 
 def _canonical(matrix: sp.csc_array) -> sp.csc_array:
@@ -201,13 +202,13 @@ def _residual(stiffness: sp.csc_array, mass: MassMatrix, solve: Factorization, v
     parts makes large forces that do little work. What the sums Kφ are rounded by has a figure η of its own, which
     nobody can tell from what is left: it is taken off.
     """
-    force = stiffness @ modes
-    left = force - mass @ modes * values
+    force = times(stiffness, modes)
+    left = force - times(mass, modes) * values
     size = np.linalg.norm(force, axis=0)
     share = np.linalg.norm(left, axis=0) / size
     if share.max() <= _RESIDUAL:
         return float(share.max())
-    terms = abs(stiffness) @ np.abs(modes)
+    terms = magnitudes(stiffness) @ np.abs(modes)
     figure = float((share - _ROUNDING * np.linalg.norm(terms, axis=0) / size).max())
     if figure <= _RESIDUAL:
         return figure
@@ -284,6 +285,6 @@ def modes_below(
 
 
 def _count(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, elimination: Elimination) -> int | None:
-    needed = elimination.peak_bytes(keep=False)
+    needed = bytes_needed(elimination, keep=False)
     refuse_too_large(needed, f"count of modes of {stiffness.shape[0]} dofs")
     return negative_pivots(stiffness, elimination, _announced(elimination, "counting modes", needed), mass, shift)

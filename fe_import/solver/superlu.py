@@ -29,7 +29,7 @@ class PermutedFactor:
         return result
 
 
-def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Callable[[int], None]) -> PermutedFactor:
+def factorize(matrix: sp.csc_array, elimination: Elimination, advance: Callable[[float], None]) -> PermutedFactor:
     """LU factors, with the elimination's order."""
     permuted = matrix[elimination.order][:, elimination.order].tocsc()
     try:

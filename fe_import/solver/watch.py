@@ -7,10 +7,6 @@ import time
 from collections.abc import Callable, Iterator
 from contextvars import ContextVar
 
-import numpy as np
-
-from fe_import.model import Array
-
 _INTERVAL = 5.0  # seconds between messages on the way
 
 _tell: ContextVar[Callable[[str], None] | None] = ContextVar("tell", default=None)
@@ -34,23 +30,23 @@ def say(message: str) -> None:
 
 
 class Progress:
-    """Says every few seconds how far a computation is; called with the number of each step that is done.
+    """Says every few seconds how far a computation is; called with the operations that are done.
 
     Parameters
     ----------
     what : str
         Begins each message.
-    work : (n,) array
-        Of each step.
+    work : float
+        Operations of all.
     """
 
-    def __init__(self, what: str, work: Array) -> None:
-        self._what, self._work = what, np.cumsum(work)
+    def __init__(self, what: str, work: float) -> None:
+        self._what, self._work = what, work
         self._told = time.monotonic()
 
-    def __call__(self, step: int) -> None:
-        """This step is done, and all before."""
+    def __call__(self, done: float) -> None:
+        """So many operations are done."""
         now = time.monotonic()
         if now - self._told > _INTERVAL:
             self._told = now
-            say(f"{self._what}: {100 * self._work[step] / self._work[-1]:.0f} % done")
+            say(f"{self._what}: {100 * done / self._work:.0f} % done")

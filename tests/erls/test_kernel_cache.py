@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from erls.maths import address_space, jit, kernel_cache
+from erls.maths import jit
+from fe_import.compiled import address_space, kernel_cache
 
 pytestmark = pytest.mark.skipif(not jit.ENABLED, reason="nothing is compiled with ERLS_JIT=0")
 

@@ -41,5 +41,5 @@ def clamped(element: str, divisions: tuple[int, int, int], size: tuple[float, fl
     )
 
 
-def silent(front: int) -> None:
+def silent(done: float) -> None:
     pass

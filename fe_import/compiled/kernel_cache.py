@@ -22,7 +22,7 @@ from numba.core.caching import (
     UserProvidedCacheLocator,
 )
 
-from erls.maths.address_space import TO_COMPILE, TO_LOAD, require_room
+from fe_import.compiled.address_space import TO_COMPILE, TO_LOAD, require_room
 
 FORMAT = 1  # of the files; a number for the name of their folder
 _SEAL = 4  # bytes of a check sum

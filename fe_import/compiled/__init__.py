@@ -1,0 +1,1 @@
+"""Compiled functions: where their code is kept, and what they call."""
