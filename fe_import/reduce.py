@@ -19,7 +19,6 @@ from fe_import.files.versions import package_version
 from fe_import.health.materials import check_materials
 from fe_import.health.matrix_scale import speed_of_sound
 from fe_import.health.mechanisms import NOT_CLEAR, mechanism
-<<<<<<< HEAD
 from fe_import.health.plausibility import (
     SOUND_IN_CONDENSED,
     SOUND_IN_MATRICES,
@@ -27,9 +26,6 @@ from fe_import.health.plausibility import (
     plausible_materials,
     refuse_slips,
 )
-from fe_import.health.report import RIGID, ROUNDING, check_basis, check_model, check_reduction, mode_residuals
-=======
-from fe_import.health.plausibility import SOUND_IN_MATRICES, plausible_link, plausible_materials, refuse_slips
 from fe_import.health.report import (
     RIGID,
     ROUNDING,
@@ -39,7 +35,6 @@ from fe_import.health.report import (
     check_reduction,
     mode_residuals,
 )
->>>>>>> b51f8eb2200d8a95c8f71520a3318b6b8fd50a09
 from fe_import.health.static_flexibility import check_static
 from fe_import.health.thermal_expansion import check_expansion
 from fe_import.health.thickness import plausible_thickness

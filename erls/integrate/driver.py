@@ -16,8 +16,8 @@ from erls.integrate.base import Halved, Leg, Observer, Options, Solution, StopRu
 from erls.integrate.memory import Keeper, Keeping, Memory, Method, taken, unfit
 from erls.integrate.switching import Switch, Switching, switching_of
 from erls.integrate.thinning import thinned
-from fe_import.compiled.address_space import take_buffers
 from erls.maths.so3 import Array
+from fe_import.compiled.address_space import take_buffers
 
 _PAUSE = 0.05  # s between looks at the observer and at interrupts
 _SINGLE = 32  # first steps of an observed run, each looked at: a short run is seen step by step
