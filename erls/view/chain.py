@@ -19,7 +19,7 @@ from erls.mechanism.links import Link
 from erls.run.chain.places import node_positions, rigid_frames, rigid_positions, surface_positions
 from erls.run.chain.run import ChainRun
 from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
-from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines, thick
+from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surface, link_outline
 from erls.view.stress import chain_values
 from fe_import.model import IntArray
 
@@ -113,11 +113,9 @@ class ChainPose(Pose):
         """Deformed links."""
         found = []
         for link, places, values in zip(self._links, self.nodes(magnification), self.values(), strict=True):
-            model, root, (triangles, lines) = link.model, link.inboard.node, _cells(link)
-            if len(model.heights):
-                places, triangles, values = thick(places, triangles, model.heights, values)
-            surface = part_surface(places, triangles, chains(model.nodes, lines), root, values, unit)
-            found.append(Part(surface, bool(len(triangles))))
+            cells = _cells(link)
+            surface = drawn_link(link.model, link.inboard.node, cells, places, values, unit)
+            found.append(Part(surface, bool(len(cells[0]))))
         return found
 
     def joints(self, magnification: float, unit: float, moving: bool) -> Any:
@@ -129,18 +127,8 @@ class ChainPose(Pose):
 
     def outline(self) -> list[Any]:
         """The links without displacement: the Equivalent Rigid Link System."""
-        import pyvista as pv
-
-        result = []
-        for link, places in zip(self._links, self.nodes(0.0), strict=True):
-            triangles, lines = _cells(link)
-            if len(triangles):
-                solid = pv.PolyData.from_regular_faces(places, triangles)
-                result.append(solid.extract_feature_edges(SHARP))
-            runs = chains(link.model.nodes, lines)
-            if runs:
-                result.append(polylines(places, runs))
-        return result
+        outlines = zip(self._links, self.nodes(0.0), strict=True)
+        return [line for link, places in outlines for line in link_outline(link.model, _cells(link), places)]
 
     def meshes(self, magnification: float) -> list[PartMesh]:
         """Links, in the order of their nodes, then of the corners of their surfaces."""
