@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,12 +15,12 @@ from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import single
-from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
+from erls.mechanism.loops import LoopEnd
 from erls.run.chain.places import node_positions, rigid_frames, rigid_positions, surface_positions
 from erls.run.chain.run import ChainRun
 from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
-from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surface, link_outline
+from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surface, link_outline, plane_surface
 from erls.view.stress import chain_values
 from fe_import.model import IntArray
 
@@ -44,17 +45,34 @@ class ChainFigure(Figure):
         return max(link.size for link in links)
 
     def fixed(self) -> Array:
-        """(n, 3) joints on the ground."""
-        return np.array([joint.before[:3, 3] for joint in self._standing])
+        """(n, 3) joints on the ground, and where points come nearest to planes there."""
+        places = [*(frame[:3, 3] for frame in self._standing), *(place for place, _ in self._planes)]
+        return np.array(places).reshape(-1, 3)
 
     def ground(self, towards: Array, unit: float) -> list[Any]:
-        """A plate behind each joint on it."""
-        return [ground_surface(joint.before, towards, unit) for joint in self._standing]
+        """A plate behind each joint on it, a piece of each plane that points may touch."""
+        plates = [ground_surface(frame, towards, unit) for frame in self._standing]
+        return [*plates, *(plane_surface(place, normal, 0.25 * self.size) for place, normal in self._planes)]
 
     @property
-    def _standing(self) -> list[Joint]:
-        """Joints on the ground."""
-        return [joint for joint in self.run.formulation.mechanism.joints if joint.parent < 0]
+    def _standing(self) -> list[Array]:
+        """(4, 4) frames on the ground of joints and closing joints."""
+        mechanism = self.run.formulation.mechanism
+        ends = [end for loop in mechanism.loops if loop.holds_frames for end in (loop.inner, loop.outer)]
+        frames = [joint.before for joint in mechanism.joints if joint.parent < 0]
+        return frames + [end.frame for end in ends if end.link is None]
+
+    @cached_property
+    def _planes(self) -> list[tuple[Array, Array]]:
+        """(3,) a place in each plane on the ground, below where its point begins, and (3,) its normal."""
+        mechanism, (start,) = self.run.formulation.mechanism, self.run.states([self.run.start])
+        found = []
+        for contact in mechanism.contacts:
+            if contact.base is None:
+                place = node_positions(mechanism, start, contact.link, [contact.node])[0]
+                above = (place - contact.position) @ contact.normal
+                found.append((place - above * contact.normal, contact.normal))
+        return found
 
     def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:
         """The chain at each time."""
@@ -121,8 +139,9 @@ class ChainPose(Pose):
     def joints(self, magnification: float, unit: float, moving: bool) -> Any:
         """Joints on their links."""
         places = joint_places(self.mechanism, self.state, magnification)
-        if moving and places[0].type == "revolute":
-            places = places[1:]  # the first one does not move
+        places += closing_places(self.mechanism, self.state, magnification)
+        if moving:  # hinges on the ground stay where they are
+            places = [place for place in places if place.inner_node is not None or place.type != "revolute"]
         return joints_surface(places, unit) if places else None
 
     def outline(self) -> list[Any]:
@@ -192,6 +211,32 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
         along = pose(np.roll(np.eye(3), joint.freedom.axis - 2, axis=0))  # z along the axis of the motion
         result.append(JointPlace(kind, inner @ along, outer @ along, inner_node, outer_node))
     return result
+
+
+def closing_places(mechanism: Mechanism, state: State, magnification: float) -> list[JointPlace]:
+    """Every closing joint and bushing, likewise."""
+    result = []
+    for loop in mechanism.loops:
+        if not loop.holds_frames:
+            continue
+        kind, along = "spherical", np.eye(4)
+        if loop.freedom is not None:
+            kind = single(loop.freedom.freedom).name
+            along = pose(np.roll(np.eye(3), loop.freedom.freedom.axis - 2, axis=0))
+        inner, inner_node = _end(mechanism, state, loop.inner, magnification)
+        outer, outer_node = _end(mechanism, state, loop.outer, magnification)
+        on_links = outer[:3, 3] if outer_node is None else outer_node
+        result.append(JointPlace(kind, inner @ along, outer @ along, inner_node, on_links))
+    return result
+
+
+def _end(mechanism: Mechanism, state: State, end: LoopEnd, magnification: float) -> tuple[Array, Array | None]:
+    """(4, 4) world pose of a frame of a closing joint, turned as its link, and (3,) the node that carries it."""
+    if end.link is None:
+        return end.frame, None
+    (node,) = node_positions(mechanism, state, end.link, [end.node], magnification)
+    turned = state.poses[end.link][:3, :3]
+    return pose(turned @ end.frame[:3, :3], node + turned @ end.frame[:3, 3]), node
 
 
 def _displaced(mechanism: Mechanism, interface: Any, frame: Array, state: State, number: int, factor: float) -> Array:

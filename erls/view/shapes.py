@@ -302,3 +302,10 @@ def ground_surface(place: Array, towards: Array, unit: float) -> Any:
             parts += rod(start, end, 0.28 * unit)
             parts += rod(start[[1, 0, 2]], end[[1, 0, 2]], 0.28 * unit)
     return joined([with_normals(p) for p in parts]).transform(place, inplace=False)
+
+
+def plane_surface(place: Array, normal: Array, half: float) -> Any:
+    """A piece of a plane, so wide to either side."""
+    import pyvista as pv
+
+    return pv.Plane(center=place, direction=normal, i_size=2 * half, j_size=2 * half, i_resolution=1, j_resolution=1)
