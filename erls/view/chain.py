@@ -24,6 +24,8 @@ from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surf
 from erls.view.stress import chain_values
 from fe_import.model import IntArray
 
+_PLANE = 0.12  # half of the width that is drawn of a plane, of the size of the largest link
+
 
 @dataclass(frozen=True)
 class ChainFigure(Figure):
@@ -45,14 +47,14 @@ class ChainFigure(Figure):
         return max(link.size for link in links)
 
     def fixed(self) -> Array:
-        """(n, 3) joints on the ground, and where points come nearest to planes there."""
-        places = [*(frame[:3, 3] for frame in self._standing), *(place for place, _ in self._planes)]
-        return np.array(places).reshape(-1, 3)
+        """(n, 3) joints on the ground, and corners of what is drawn of planes there."""
+        joints = np.array([frame[:3, 3] for frame in self._standing]).reshape(-1, 3)
+        return np.concatenate([joints, *self._planes])
 
     def ground(self, towards: Array, unit: float) -> list[Any]:
         """A plate behind each joint on it, a piece of each plane that points may touch."""
         plates = [ground_surface(frame, towards, unit) for frame in self._standing]
-        return [*plates, *(plane_surface(place, normal, 0.25 * self.size) for place, normal in self._planes)]
+        return [*plates, *(plane_surface(corners) for corners in self._planes)]
 
     @property
     def _standing(self) -> list[Array]:
@@ -63,15 +65,17 @@ class ChainFigure(Figure):
         return frames + [end.frame for end in ends if end.link is None]
 
     @cached_property
-    def _planes(self) -> list[tuple[Array, Array]]:
-        """(3,) a place in each plane on the ground, below where its point begins, and (3,) its normal."""
+    def _planes(self) -> list[Array]:
+        """(4, 3) corners of a piece of each plane on the ground, below where its point begins."""
         mechanism, (start,) = self.run.formulation.mechanism, self.run.states([self.run.start])
         found = []
         for contact in mechanism.contacts:
             if contact.base is None:
                 place = node_positions(mechanism, start, contact.link, [contact.node])[0]
-                above = (place - contact.position) @ contact.normal
-                found.append((place - above * contact.normal, contact.normal))
+                normal, *along = contact.axes.reshape(3, 3)
+                below = place - ((place - contact.position) @ normal) * normal
+                sides = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) @ (_PLANE * self.size * np.array(along))
+                found.append(below + sides)
         return found
 
     def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:

@@ -304,8 +304,8 @@ def ground_surface(place: Array, towards: Array, unit: float) -> Any:
     return joined([with_normals(p) for p in parts]).transform(place, inplace=False)
 
 
-def plane_surface(place: Array, normal: Array, half: float) -> Any:
-    """A piece of a plane, so wide to either side."""
+def plane_surface(corners: Array) -> Any:
+    """A piece of a plane with corners (4, 3)."""
     import pyvista as pv
 
-    return pv.Plane(center=place, direction=normal, i_size=2 * half, j_size=2 * half, i_resolution=1, j_resolution=1)
+    return pv.PolyData.from_regular_faces(corners, np.array([[0, 1, 2, 3]]))
