@@ -83,7 +83,7 @@ def opened(browser: Any, page: str, size: tuple[int, int], scheme: str = "light"
     media = {"features": [{"name": "prefers-color-scheme", "value": scheme}]}
     browser.execute_cdp_cmd("Emulation.setEmulatedMedia", media)
     browser.get(page)
-    browser.execute_script("dispatchEvent(new Event('beforeprint'))")
+    browser.execute_script("['beforeprint', 'afterprint'].forEach(name => dispatchEvent(new Event(name)))")
 
 
 def _look_at(browser: Any, size: tuple[int, int]) -> None:
@@ -256,6 +256,19 @@ def test_nothing_is_plotted_that_is_nothing(pages: dict[str, str]) -> None:
     assert "<h2 id=\"joint-angles\">" not in text
     assert "Effects" in text
     assert "centrifugal_load" in text
+
+
+def test_dark_pages_are_printed_in_dark_ink(browser: Any, pages: dict[str, str]) -> None:
+    """Words of plots are light on the screen, black on paper, and light again."""
+    opened(browser, pages["steel_tall"], DESKTOP, "dark")
+    shade = "return getComputedStyle(document.querySelector('.plot .xtick text')).fill.match(/\\d+/g).map(Number)"
+    found = []
+    for event in ("", "beforeprint", "afterprint"):
+        browser.execute_script("if (arguments[0]) dispatchEvent(new Event(arguments[0]))", event)
+        found.append(sum(browser.execute_script(shade)))
+    assert found[0] == found[2] > 600
+    assert found[1] == 0
+    assert said(browser) == []
 
 
 def test_tables_sort_by_their_heads(browser: Any, pages: dict[str, str]) -> None:

@@ -56,13 +56,14 @@ def view(
     Parameters
     ----------
     run
-        Run file.
+        Run file, or modal file.
     output
         File to write.
     at
         Times in seconds, at rest load parameters, separated by commas, instead of even ones (picture, .pvd, .csv).
     mode
-        Show this vibration or buckling mode of bodies and beams, from 1 on, over the phase of its period (--at).
+        Show this vibration or buckling mode of bodies and beams, or this elastic mode of a modal file, from 1 on, over
+        the phase of its period (--at).
     magnify
         Factor on the displacement of the links, or of bodies and beams at rest; 1 shows it true.
     color
@@ -85,11 +86,16 @@ def view(
     from erls.files.results import claim
     from erls.run.bodies.mode import mode_of
     from erls.run.file import load_run
+    from erls.run.link_mode import is_modal_file, link_mode
     from erls.view import show, view_kind, write_view
 
-    loaded = load_run(run)
-    if mode is not None:
-        loaded = mode_of(loaded, mode)
+    loaded: Run
+    if is_modal_file(run):
+        loaded = link_mode(run, 1 if mode is None else mode)
+    else:
+        loaded = load_run(run)
+        if mode is not None:
+            loaded = mode_of(loaded, mode)
     if overlay is not None:
         return _overlaid(loaded, run, overlay, output, force, json)
     if output is None:

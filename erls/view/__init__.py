@@ -12,6 +12,7 @@ import numpy as np
 
 from erls.files.output import check_writable, replacing
 from erls.files.results import MARK
+from erls.run.link_mode import LinkMode
 from erls.run.record import Run
 from erls.view.camera import Size
 from erls.view.checks import Progress, bad, check, drawing, no_picture, surveyed
@@ -197,6 +198,8 @@ def write_view(
         what = "a table holds" if suffix == ".csv" else "a report has a slider for it and shows"
         raise bad("magnification", f"{what} true values", magnification, None, "leave it at 1")
     elif suffix == ".html":
+        if isinstance(run, LinkMode):
+            raise bad("-o", "a report is of a run, not of a mode", suffix, None, "make a picture, film or table")
         if times is not None and len(times):
             raise bad("times", "a report shows the whole run", list(times), None, "leave the times out")
         text = run_page(run, repeat)

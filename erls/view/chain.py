@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -14,14 +15,16 @@ from erls.maths.se3 import inverse, pose
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import single
-from erls.mechanism.joints import Joint
 from erls.mechanism.links import Link
+from erls.mechanism.loops import LoopEnd
 from erls.run.chain.places import node_positions, rigid_frames, rigid_positions, surface_positions
 from erls.run.chain.run import ChainRun
 from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
-from erls.view.shapes import SHARP, JointPlace, chains, ground_surface, joints_surface, part_surface, polylines, thick
+from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surface, link_outline, plane_surface
 from erls.view.stress import chain_values
 from fe_import.model import IntArray
+
+_PLANE = 0.12  # half of the width that is drawn of a plane, of the size of the largest link
 
 
 @dataclass(frozen=True)
@@ -44,17 +47,36 @@ class ChainFigure(Figure):
         return max(link.size for link in links)
 
     def fixed(self) -> Array:
-        """(n, 3) joints on the ground."""
-        return np.array([joint.before[:3, 3] for joint in self._standing])
+        """(n, 3) joints on the ground, and corners of what is drawn of planes there."""
+        joints = np.array([frame[:3, 3] for frame in self._standing]).reshape(-1, 3)
+        return np.concatenate([joints, *self._planes])
 
     def ground(self, towards: Array, unit: float) -> list[Any]:
-        """A plate behind each joint on it."""
-        return [ground_surface(joint.before, towards, unit) for joint in self._standing]
+        """A plate behind each joint on it, a piece of each plane that points may touch."""
+        plates = [ground_surface(frame, towards, unit) for frame in self._standing]
+        return [*plates, *(plane_surface(corners) for corners in self._planes)]
 
     @property
-    def _standing(self) -> list[Joint]:
-        """Joints on the ground."""
-        return [joint for joint in self.run.formulation.mechanism.joints if joint.parent < 0]
+    def _standing(self) -> list[Array]:
+        """(4, 4) frames on the ground of joints and closing joints."""
+        mechanism = self.run.formulation.mechanism
+        ends = [end for loop in mechanism.loops if loop.holds_frames for end in (loop.inner, loop.outer)]
+        frames = [joint.before for joint in mechanism.joints if joint.parent < 0]
+        return frames + [end.frame for end in ends if end.link is None]
+
+    @cached_property
+    def _planes(self) -> list[Array]:
+        """(4, 3) corners of a piece of each plane on the ground, below where its point begins."""
+        mechanism, (start,) = self.run.formulation.mechanism, self.run.states([self.run.start])
+        found = []
+        for contact in mechanism.contacts:
+            if contact.base is None:
+                place = node_positions(mechanism, start, contact.link, [contact.node])[0]
+                normal, *along = contact.axes.reshape(3, 3)
+                below = place - ((place - contact.position) @ normal) * normal
+                sides = np.array([[1, 1], [-1, 1], [-1, -1], [1, -1]]) @ (_PLANE * self.size * np.array(along))
+                found.append(below + sides)
+        return found
 
     def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:
         """The chain at each time."""
@@ -113,34 +135,23 @@ class ChainPose(Pose):
         """Deformed links."""
         found = []
         for link, places, values in zip(self._links, self.nodes(magnification), self.values(), strict=True):
-            model, root, (triangles, lines) = link.model, link.inboard.node, _cells(link)
-            if len(model.heights):
-                places, triangles, values = thick(places, triangles, model.heights, values)
-            surface = part_surface(places, triangles, chains(model.nodes, lines), root, values, unit)
-            found.append(Part(surface, bool(len(triangles))))
+            cells = _cells(link)
+            surface = drawn_link(link.model, link.inboard.node, cells, places, values, unit)
+            found.append(Part(surface, bool(len(cells[0]))))
         return found
 
     def joints(self, magnification: float, unit: float, moving: bool) -> Any:
         """Joints on their links."""
         places = joint_places(self.mechanism, self.state, magnification)
-        if moving and places[0].type == "revolute":
-            places = places[1:]  # the first one does not move
+        places += closing_places(self.mechanism, self.state, magnification)
+        if moving:  # hinges on the ground stay where they are
+            places = [place for place in places if place.inner_node is not None or place.type != "revolute"]
         return joints_surface(places, unit) if places else None
 
     def outline(self) -> list[Any]:
         """The links without displacement: the Equivalent Rigid Link System."""
-        import pyvista as pv
-
-        result = []
-        for link, places in zip(self._links, self.nodes(0.0), strict=True):
-            triangles, lines = _cells(link)
-            if len(triangles):
-                solid = pv.PolyData.from_regular_faces(places, triangles)
-                result.append(solid.extract_feature_edges(SHARP))
-            runs = chains(link.model.nodes, lines)
-            if runs:
-                result.append(polylines(places, runs))
-        return result
+        outlines = zip(self._links, self.nodes(0.0), strict=True)
+        return [line for link, places in outlines for line in link_outline(link.model, _cells(link), places)]
 
     def meshes(self, magnification: float) -> list[PartMesh]:
         """Links, in the order of their nodes, then of the corners of their surfaces."""
@@ -204,6 +215,32 @@ def joint_places(mechanism: Mechanism, state: State, magnification: float) -> li
         along = pose(np.roll(np.eye(3), joint.freedom.axis - 2, axis=0))  # z along the axis of the motion
         result.append(JointPlace(kind, inner @ along, outer @ along, inner_node, outer_node))
     return result
+
+
+def closing_places(mechanism: Mechanism, state: State, magnification: float) -> list[JointPlace]:
+    """Every closing joint and bushing, likewise."""
+    result = []
+    for loop in mechanism.loops:
+        if not loop.holds_frames:
+            continue
+        kind, along = "spherical", np.eye(4)
+        if loop.freedom is not None:
+            kind = single(loop.freedom.freedom).name
+            along = pose(np.roll(np.eye(3), loop.freedom.freedom.axis - 2, axis=0))
+        inner, inner_node = _end(mechanism, state, loop.inner, magnification)
+        outer, outer_node = _end(mechanism, state, loop.outer, magnification)
+        on_links = outer[:3, 3] if outer_node is None else outer_node
+        result.append(JointPlace(kind, inner @ along, outer @ along, inner_node, on_links))
+    return result
+
+
+def _end(mechanism: Mechanism, state: State, end: LoopEnd, magnification: float) -> tuple[Array, Array | None]:
+    """(4, 4) world pose of a frame of a closing joint, turned as its link, and (3,) the node that carries it."""
+    if end.link is None:
+        return end.frame, None
+    (node,) = node_positions(mechanism, state, end.link, [end.node], magnification)
+    turned = state.poses[end.link][:3, :3]
+    return pose(turned @ end.frame[:3, :3], node + turned @ end.frame[:3, 3]), node
 
 
 def _displaced(mechanism: Mechanism, interface: Any, frame: Array, state: State, number: int, factor: float) -> Array:

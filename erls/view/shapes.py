@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from erls.maths.so3 import Array
+from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
 
 _SMOOTH = math.cos(math.radians(20.0))  # a frame that turns more at a node has a corner there
@@ -155,6 +156,30 @@ def thick(positions: Array, triangles: IntArray, heights: Array, values: Array) 
     return places, whole, np.tile(values, 3)
 
 
+Cells: TypeAlias = tuple[IntArray, IntArray]
+"""(t, 3) triangles and (l, 2) lines."""
+
+
+def drawn_link(model: ModalModel, root: int, cells: Cells, places: Array, values: Array, unit: float) -> Any:
+    """A link with its nodes at places (n, 3) as a surface, shells with their thickness, coloured by values (n,)."""
+    triangles, lines = cells
+    if len(model.heights):
+        places, triangles, values = thick(places, triangles, model.heights, values)
+    return part_surface(places, triangles, chains(model.nodes, lines), root, values, unit)
+
+
+def link_outline(model: ModalModel, cells: Cells, places: Array) -> list[Any]:
+    """The edges of a link with its nodes at places (n, 3), as thin lines."""
+    import pyvista as pv
+
+    triangles, lines = cells
+    found = []
+    if len(triangles):
+        found.append(pv.PolyData.from_regular_faces(places, triangles).extract_feature_edges(SHARP))
+    runs = chains(model.nodes, lines)
+    return [*found, polylines(places, runs)] if runs else found
+
+
 def polylines(points: Array, runs: list[list[int]]) -> Any:
     """Curves through points, as pyvista.PolyData."""
     import pyvista as pv
@@ -277,3 +302,10 @@ def ground_surface(place: Array, towards: Array, unit: float) -> Any:
             parts += rod(start, end, 0.28 * unit)
             parts += rod(start[[1, 0, 2]], end[[1, 0, 2]], 0.28 * unit)
     return joined([with_normals(p) for p in parts]).transform(place, inplace=False)
+
+
+def plane_surface(corners: Array) -> Any:
+    """A piece of a plane with corners (4, 3)."""
+    import pyvista as pv
+
+    return pv.PolyData.from_regular_faces(corners, np.array([[0, 1, 2, 3]]))

@@ -19,6 +19,7 @@ from erls.run.bodies.mode import BodyMode
 from erls.run.bodies.run import BodyRun
 from erls.run.chain.recovered import maps_of, recovered
 from erls.run.chain.run import ChainRun
+from erls.run.link_mode import LinkMode
 from erls.run.record import Run
 from erls.view.figure import DEFLECTION, FORCE, MOMENT, STRESS, Shade
 from fe_import.modal.recovery_maps import von_mises
@@ -36,8 +37,8 @@ _MEASURES: dict[Shade, tuple[str, Callable[[Array], Array]]] = {
 
 def holds(run: Run, shade: Shade) -> bool:
     """Whether links or shells of a run tell it; the amplitude of a mode means nothing, and so does its stress."""
-    if shade is DEFLECTION:
-        return True
+    if shade is DEFLECTION or isinstance(run, LinkMode):
+        return shade is DEFLECTION
     if isinstance(run, ChainRun):
         models = [run.formulation.mechanism.links[k].model for k in run.formulation.mechanism.bodies]
         wanted = _MEASURES[shade][0]

@@ -8,6 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from erls.run.bodies.mode import BodyMode
+from erls.run.link_mode import LinkMode
 from erls.run.record import Run
 from erls.view.camera import Pixels, text_unit
 from erls.view.figure import Pose
@@ -29,7 +30,7 @@ def written(stage: Stage, pixels: Pixels, caption: str) -> Sheet:
 
 def displacement(run: Run, magnification: float) -> str:
     """How displacement is shown."""
-    if isinstance(run, BodyMode):
+    if isinstance(run, BodyMode | LinkMode):
         return "amplitude without scale"
     return "true displacement" if magnification == 1.0 else f"displacement × {magnification:g}"
 

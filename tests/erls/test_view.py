@@ -4,7 +4,9 @@ import itertools
 import os
 import subprocess
 import sys
+from pathlib import Path
 
+import contact_scenes
 import imageio_ffmpeg
 import numpy as np
 import pytest
@@ -16,10 +18,10 @@ from erls.errors import Cause, SceneError, SimulationError
 from erls.files.results import claim
 from erls.view import film, picture, show, write_view
 from erls.view.camera import Box, Camera, Walls
-from erls.view.chain import joint_places
+from erls.view.chain import closing_places, joint_places
 from erls.view.checks import surveyed
 from erls.view.figures import figure_of
-from erls.view.shapes import chains
+from erls.view.shapes import chains, joints_surface
 from erls.view.stage import Motion
 from erls.view.window import Window
 
@@ -257,3 +259,28 @@ def test_both_sides_of_a_joint_meet(robot):
         np.testing.assert_allclose(place.inner[:3, 3], place.outer[:3, 3], atol=1e-6)
         np.testing.assert_allclose(place.inner[:3, 2], place.outer[:3, 2], atol=1e-4)
         np.testing.assert_allclose(place.outer_node, place.outer[:3, 3], atol=1e-9)
+
+
+def test_closing_joints_and_planes_are_drawn(tmp_path: Path) -> None:
+    """A joint that closes a loop with a plate where it stands on the ground, both its ends at one place to what loops
+    stay open by; a piece of the plane that a point may touch, below that point.
+    """
+    scene = erls.load_scene(ROOT / "data/five_bar/parallel_robot.toml", ["simulation.duration=0.02"])
+    run = erls.simulate(scene, verdict=False)
+    figure = figure_of(run)
+    (loop,) = (loop for loop in run.formulation.mechanism.loops if loop.holds_frames)
+    (end,) = (end for end in (loop.inner, loop.outer) if end.link is None)
+    assert any(np.array_equal(place, end.frame[:3, 3]) for place in figure.fixed())
+    assert len(figure.ground(np.array([0.0, -1.0, 0.0]), 0.01)) == 2
+    (state,) = run.states([0.02])
+    (place,) = closing_places(run.formulation.mechanism, state, 1.0)
+    assert place.type == "revolute"
+    np.testing.assert_allclose(place.inner[:3, 3], place.outer[:3, 3], atol=1e-9)
+    for bodies in ([], [place]):
+        drawn = joints_surface([*joint_places(run.formulation.mechanism, state, 1.0), *bodies], 0.01)
+        near = np.linalg.norm(np.asarray(drawn.points) - end.frame[:3, 3], axis=1).min() < 0.05
+        assert near == bool(bodies)
+    ball = erls.simulate(contact_scenes.falling(tmp_path, 0.5, 0.3, 0.0, 9.81), verdict=False)
+    _, plane = figure_of(ball).ground(np.array([0.0, -1.0, 0.0]), 0.01)
+    np.testing.assert_allclose(np.asarray(plane.points)[:, 2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(np.asarray(plane.points).mean(axis=0), 0.0, atol=1e-12)

@@ -3,7 +3,9 @@
 (() => {
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const read = (box) => JSON.parse(document.getElementById(box.id + "-data").textContent);
-  const colour = (name) => getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
+  const PAPER = { text: "#000", soft: "#444", paper: "#fff", grid: "#bbb" }; // as in print, of which no script can ask
+  let printing = false;
+  const colour = (name) => (printing && PAPER[name]) || getComputedStyle(document.documentElement).getPropertyValue("--" + name).trim();
   const LIGHT = ["#3d55c8", "#c25b00", "#1f7a4d", "#b3261e", "#7a3fa0", "#5a6169", "#0a7d8c", "#a0206e", "#7d6608", "#1d6fb8", "#5b4636", "#4f7a00"];
   const DARK = ["#9db0ff", "#ffb066", "#7fd3a3", "#f28b82", "#cfa3f0", "#b8bec4", "#6fd3e0", "#f29ac8", "#e3d26f", "#7cc0f5", "#cbb3a1", "#b5dd6a"];
   const drawn = [];
@@ -32,7 +34,7 @@
 
   function layout(plot) {
     return {
-      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", colorway: dark.matches ? DARK : LIGHT,
+      paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", colorway: dark.matches && !printing ? DARK : LIGHT,
       font: { color: colour("text"), size: 12, family: "system-ui, sans-serif" }, margin: { l: 62, r: 12, t: 12, b: 48 },
       xaxis: { ...axis(plot.x, plot.logarithmic.includes("x")), showspikes: true, spikemode: "across", spikesnap: "cursor",
         spikethickness: 1, spikecolor: colour("soft"), spikedash: "solid", ...counts(plot) },
@@ -279,11 +281,16 @@
       for (const entry of entries) if (entry.isIntersecting) { seen.unobserve(entry.target); draw(entry.target); }
     }, { rootMargin: "400px" });
     document.querySelectorAll(".plot, .view").forEach((box) => seen.observe(box));
-    addEventListener("beforeprint", () => document.querySelectorAll("details").forEach((more) => { more.open = true; }));
-    addEventListener("beforeprint", () => document.querySelectorAll(".plot, .view").forEach(draw));
-    dark.addEventListener("change", () => drawn.forEach(({ box, plot, again }) => {
+    const redraw = () => drawn.forEach(({ box, plot, again }) => {
       if (again) again(); else Plotly.react(box, traces(plot), layout(plot), still);
-    }));
+    });
+    addEventListener("beforeprint", () => {
+      document.querySelectorAll("details").forEach((more) => { more.open = true; });
+      document.querySelectorAll(".plot, .view").forEach(draw);
+      if (dark.matches) { printing = true; redraw(); }
+    });
+    addEventListener("afterprint", () => { if (printing) { printing = false; redraw(); } });
+    dark.addEventListener("change", redraw);
   }
   if (document.readyState === "loading") document.addEventListener("DOMContentLoaded", start); else start();
 })();
