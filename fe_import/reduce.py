@@ -185,19 +185,24 @@ def _heights(model: FEModel) -> Array:
 
 
 def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:
-    if link.description.solid is None:
+    solid, shell = link.description.solid, link.description.shell
+    if solid is None and shell is None:
         return ()
     from fe_import.elements.mixed_stress import MixedStress  # frames have no use for it
+    from fe_import.elements.shell_stress import ShellStress
     from fe_import.elements.solid_stress import SolidStress
     from fe_import.health.incompressible import check_incompressible
     from fe_import.health.mesh_error import check_mesh_error
     from fe_import.health.mesh_shape import check_mesh_shape
 
-    source = model.stress.parts[0] if isinstance(model.stress, MixedStress) else model.stress
-    assert isinstance(source, SolidStress)
-    limit = link.description.solid.mesh_error
-    shape = (*check_mesh_shape(source.mesh), *check_incompressible(source))
-    return (*shape, *check_mesh_error(model, source, shapes, omega, limit, str(link.path)))
+    sources = model.stress.parts if isinstance(model.stress, MixedStress) else (model.stress,)
+    known = [source for source in sources if isinstance(source, (SolidStress, ShellStress))]
+    checks: tuple[HealthCheck, ...] = ()
+    if isinstance(known[0], SolidStress):
+        checks = (*check_mesh_shape(known[0].mesh), *check_incompressible(known[0]))
+    asked = solid or shell
+    assert asked is not None
+    return (*checks, *check_mesh_error(model, known, shapes, omega, asked.mesh_error, str(link.path)))
 
 
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:

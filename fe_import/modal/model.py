@@ -13,6 +13,7 @@ from fe_import.modal.thermal import ThermalExpansion
 from fe_import.model import Array, IntArray, InterfaceNode, Surface
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
+MESH_ERROR = "error of the first frequencies by the mesh"  # begin of the name of the check that estimates it
 
 
 @dataclass(frozen=True)
