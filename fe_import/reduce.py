@@ -32,7 +32,7 @@ from fe_import.health.thickness import plausible_thickness
 from fe_import.modal.damping import damping_ratios
 from fe_import.modal.equal_frequencies import KEPT_WHOLE
 from fe_import.modal.inertia import inertia_invariants, mass_properties
-from fe_import.modal.model import HealthCheck, ModalModel
+from fe_import.modal.model import NO_LIMIT, HealthCheck, ModalModel
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.model import build_model, unit_factors
 from fe_import.recovery.recover import recovery_maps, thermal_expansion
@@ -128,7 +128,7 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, rounding, where)
     checks += refuse_slips(_unit_checks(model, modes.omega, where), unusual, where)
     checks += _mesh_checks(model, link, shapes, modes.omega)
-    residuals = mode_residuals(model, shapes, modes.omega)
+    residuals = mode_residuals(model, shapes, modes.omega, basis.held)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     field, statement = None, "not available in physical form"
     if options.form == "physical":
@@ -185,6 +185,8 @@ def _heights(model: FEModel) -> Array:
 
 
 def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:
+    if model.kind == "matrices":
+        return (HealthCheck("error by the mesh: not judged, as matrices have no elements", 1.0, NO_LIMIT),)
     solid, shell = link.description.solid, link.description.shell
     if solid is None and shell is None:
         return ()

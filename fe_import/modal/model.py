@@ -79,7 +79,8 @@ class ModalModel:
     damping_ratios : (m,) array
         Modal damping; 0 unless the link description gives it.
     residuals : (m,) array
-        ‖Kφ - ω²Mφ‖ / ‖Kφ‖ of each elastic mode in the full model: 0 for a mode of it, 1 for a shape that is none.
+        By how much the frequencies are too high, as shares of them, by the forces that each mode leaves in the full
+        model; 0 for a mode of it.
     full_mass_properties : MassProperties
         Of the full finite-element model, for comparison.
     fixed_interface : FixedInterfaceModes
