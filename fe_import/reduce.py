@@ -19,6 +19,7 @@ from fe_import.health.materials import check_materials
 from fe_import.health.matrix_scale import speed_of_sound
 from fe_import.health.mechanisms import NOT_CLEAR, mechanism
 from fe_import.health.plausibility import (
+    POINT_MASSES,
     SOUND_IN_CONDENSED,
     SOUND_IN_MATRICES,
     plausible_link,
@@ -212,6 +213,9 @@ def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck,
     mass = mass_properties(rigid.T @ (model.mass @ rigid)).mass
     first = float(omega[6] / (2 * np.pi)) if len(omega) > 6 else None
     checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
+    if model.added_mass is not None and (added := float(rigid[:, 0] @ (model.added_mass @ rigid[:, 0]))):
+        own = max(mass - added, np.finfo(float).tiny)
+        checks += (POINT_MASSES.check(added / own, f"{where}: units"),)
     if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
         return checks
     rows = np.count_nonzero(model.dof_map >= 0)

@@ -106,6 +106,11 @@ SOUND_IN_MATRICES = Range(  # of metals, stiffness in N/mm read as N/m gives 160
     "speed of sound in the matrices", "m/s", 300.0, 5e4, 1e-6, 1e9, *_SOUND_SLIPS
 )
 SOUND_IN_CONDENSED = Range("speed of sound in the matrices", "m/s", 20.0, 5e4, 1e-6, 1e9, *_SOUND_SLIPS)
+POINT_MASSES = Range(
+    *("point masses per mass of what carries them", "", 0.0, 1e3, 0.0, 1e12),
+    below="",
+    above="g read as kg? units.mass holds for [[masses]], too",
+)
 _FREQUENCY = Range(
     *("first elastic frequency", "Hz", 1e-3, 1e7, 1e-9, 1e12),
     below="stiffness in N/mm read as N/m, or mass in g read as kg? check units",
