@@ -19,10 +19,10 @@ from fe_import.health.materials import check_materials
 from fe_import.health.matrix_scale import speed_of_sound
 from fe_import.health.mechanisms import NOT_CLEAR, mechanism
 from fe_import.health.plausibility import (
-    POINT_MASSES,
     SOUND_IN_CONDENSED,
     SOUND_IN_MATRICES,
     plausible_link,
+    plausible_masses,
     plausible_materials,
     refuse_slips,
 )
@@ -214,8 +214,7 @@ def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck,
     first = float(omega[6] / (2 * np.pi)) if len(omega) > 6 else None
     checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
     if model.added_mass is not None and (added := float(rigid[:, 0] @ (model.added_mass @ rigid[:, 0]))):
-        own = max(mass - added, np.finfo(float).tiny)
-        checks += (POINT_MASSES.check(added / own, f"{where}: units"),)
+        checks += (plausible_masses(added, mass - added),)
     if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
         return checks
     rows = np.count_nonzero(model.dof_map >= 0)

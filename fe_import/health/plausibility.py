@@ -17,6 +17,7 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array
 
+_HEAVY = 1000.0  # point masses per mass of the elements that carry them
 _THIN = 0.1  # a model of beams has no thickness: a tenth of its length encloses it
 
 
@@ -106,11 +107,6 @@ SOUND_IN_MATRICES = Range(  # of metals, stiffness in N/mm read as N/m gives 160
     "speed of sound in the matrices", "m/s", 300.0, 5e4, 1e-6, 1e9, *_SOUND_SLIPS
 )
 SOUND_IN_CONDENSED = Range("speed of sound in the matrices", "m/s", 20.0, 5e4, 1e-6, 1e9, *_SOUND_SLIPS)
-POINT_MASSES = Range(
-    *("point masses per mass of what carries them", "", 0.0, 1e3, 0.0, 1e12),
-    below="",
-    above="g read as kg? units.mass holds for [[masses]], too",
-)
 _FREQUENCY = Range(
     *("first elastic frequency", "Hz", 1e-3, 1e7, 1e-9, 1e12),
     below="stiffness in N/mm read as N/m, or mass in g read as kg? check units",
@@ -188,6 +184,13 @@ def plausible_link(
         checks.append(_FREQUENCY.check(first_frequency, place))
         checks.append(_SPEED.check(first_frequency * size, place))
     return tuple(checks)
+
+
+def plausible_masses(added: float, own: float) -> HealthCheck:
+    """Point masses beside the elements that carry them [kg]: reported, as some links are meant to weigh nothing."""
+    share = added / own if own > 0 else NO_LIMIT
+    slip = " (g read as kg? units.mass holds for [[masses]], too)" if share > _HEAVY else ""
+    return HealthCheck(f"point masses per mass of what carries them{slip}", share, _HEAVY)
 
 
 def plausible_materials(
