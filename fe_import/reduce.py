@@ -23,6 +23,7 @@ from fe_import.health.plausibility import (
     SOUND_IN_CONDENSED,
     SOUND_IN_MATRICES,
     plausible_link,
+    plausible_masses,
     plausible_materials,
     refuse_slips,
 )
@@ -41,7 +42,7 @@ from fe_import.health.thickness import plausible_thickness
 from fe_import.modal.damping import damping_ratios
 from fe_import.modal.equal_frequencies import KEPT_WHOLE
 from fe_import.modal.inertia import inertia_invariants, mass_properties
-from fe_import.modal.model import HealthCheck, ModalModel
+from fe_import.modal.model import NO_LIMIT, HealthCheck, ModalModel
 from fe_import.model import Array, FEModel, IntArray
 from fe_import.models.model import build_model, unit_factors
 from fe_import.recovery.recover import recovery_maps, thermal_expansion
@@ -138,7 +139,7 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, rounding, where)
     checks += refuse_slips(_unit_checks(model, modes.omega, where), unusual, where)
     checks += _mesh_checks(model, link, shapes, modes.omega)
-    residuals = mode_residuals(model, shapes, modes.omega)
+    residuals = mode_residuals(model, shapes, modes.omega, basis.held)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     field, statement = None, "not available in physical form"
     if options.form == "physical":
@@ -197,19 +198,26 @@ def _heights(model: FEModel) -> Array:
 
 
 def _mesh_checks(model: FEModel, link: LinkFile, shapes: Array, omega: Array) -> tuple[HealthCheck, ...]:
-    if link.description.solid is None:
+    if model.kind == "matrices":
+        return (HealthCheck("error by the mesh: not judged, as matrices have no elements", 1.0, NO_LIMIT),)
+    solid, shell = link.description.solid, link.description.shell
+    if solid is None and shell is None:
         return ()
     from fe_import.elements.mixed_stress import MixedStress  # frames have no use for it
+    from fe_import.elements.shell_stress import ShellStress
     from fe_import.elements.solid_stress import SolidStress
     from fe_import.health.incompressible import check_incompressible
     from fe_import.health.mesh_error import check_mesh_error
     from fe_import.health.mesh_shape import check_mesh_shape
 
-    source = model.stress.parts[0] if isinstance(model.stress, MixedStress) else model.stress
-    assert isinstance(source, SolidStress)
-    limit = link.description.solid.mesh_error
-    shape = (*check_mesh_shape(source.mesh), *check_incompressible(source))
-    return (*shape, *check_mesh_error(model, source, shapes, omega, limit, str(link.path)))
+    sources = model.stress.parts if isinstance(model.stress, MixedStress) else (model.stress,)
+    known = [source for source in sources if isinstance(source, (SolidStress, ShellStress))]
+    checks: tuple[HealthCheck, ...] = ()
+    if isinstance(known[0], SolidStress):
+        checks = (*check_mesh_shape(known[0].mesh), *check_incompressible(known[0]))
+    asked = solid or shell
+    assert asked is not None
+    return (*checks, *check_mesh_error(model, known, shapes, omega, asked.mesh_error, str(link.path)))
 
 
 def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck, ...]:
@@ -217,6 +225,8 @@ def _unit_checks(model: FEModel, omega: Array, where: str) -> tuple[HealthCheck,
     mass = mass_properties(rigid.T @ (model.mass @ rigid)).mass
     first = float(omega[6] / (2 * np.pi)) if len(omega) > 6 else None
     checks = plausible_link(model.nodes, mass, first, model.kind == "matrices", where)
+    if model.added_mass is not None and (added := float(rigid[:, 0] @ (model.added_mass @ rigid[:, 0]))):
+        checks += (plausible_masses(added, mass - added),)
     if model.kind != "matrices" or (speed := speed_of_sound(model)) is None:
         return checks
     rows = np.count_nonzero(model.dof_map >= 0)

@@ -23,6 +23,7 @@ from fe_import.cache import left_out_cached
 from fe_import.description.link import LinkFile
 from fe_import.modal.inertia import InertiaInvariants
 from fe_import.modal.left_out import LeftOut, extended
+from fe_import.modal.model import MESH_ERROR
 from fe_import.model import IntArray
 
 _EQUAL = 1e-9  # of the largest: rounding
@@ -87,7 +88,7 @@ def finer_links(scene: Scene, whole: Mechanism, solved: Mechanism) -> FinerLinks
             )
             exact &= _same_inertia(link.model.invariants, left.invariants.truncated(np.arange(link.model.modes)))
             if not left.refined:
-                notes[f"the mesh of link {_name(link)!r} is not judged"] = None
+                notes[_of_mesh(link)] = None
         elif lumped(link) and source is not None:
             finer = _weighed(link, source)
             exact &= _same_inertia(link.invariants, finer.invariants)
@@ -121,6 +122,14 @@ def _same_inertia(first: InertiaInvariants, second: InertiaInvariants) -> bool:
     """But for rounding."""
     pairs = ((first.m, second.m), (first.X, second.X), (first.Z, second.Z))
     return all(np.abs(one - other).max() <= _EQUAL * np.abs(one).max() for one, other in pairs)
+
+
+def _of_mesh(link: Link) -> str:
+    """What is known of a mesh that is not refined here."""
+    found = next((check.value for check in link.model.health if check.name.startswith(MESH_ERROR)), None)
+    if found is None:
+        return f"the mesh of link {_name(link)!r} is not judged"
+    return f"the mesh of link {_name(link)!r} is not in it: by its stress its frequencies are {100 * found:.2g} % off"
 
 
 def _name(link: Link) -> str:

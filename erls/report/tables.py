@@ -44,7 +44,7 @@ def modal_report(model: ModalModel) -> str:
             (str(k - 5), f"{f:.3f}", model.kinds[k], _percent(model, k), _residual(model, k))
             for k, f in enumerate(model.frequencies_hz[6:], start=6)
         ][:_SHOWN_MODES]
-        header = ("mode", "frequency [Hz]", "kind", "damping", "residual")
+        header = ("mode", "frequency [Hz]", "kind", "damping", "too high by")
         parts.append("Elastic modes of the free link\n" + table(header, modes))
     if len(model.fixed_interface.frequencies_hz):
         parts.append(_effective_mass_table(model))

@@ -89,9 +89,10 @@ def check_link(link: LinkDescription, file: str) -> None:
             raise _fail(
                 f"{place}.poissons_ratio", "Poisson's ratio out of range", m.poissons_ratio, "between -1 and 0.5"
             )
-    if link.solid is not None and not 0 < link.solid.mesh_error < math.inf:
-        message, remedy = "an error must be positive", "give a share, as 0.05 for 5 percent"
-        raise _fail(f"{file}: solid.mesh_error", message, link.solid.mesh_error, remedy)
+    for kind, meshed in (("solid", link.solid), ("shell", link.shell)):
+        if meshed is not None and not 0 < meshed.mesh_error < math.inf:
+            message, remedy = "an error must be positive", "give a share, as 0.05 for 5 percent"
+            raise _fail(f"{file}: {kind}.mesh_error", message, meshed.mesh_error, remedy)
     if link.solid is not None and link.solid.size is not None and not 0 < link.solid.size < math.inf:
         raise _fail(f"{file}: solid.size", "a size must be positive", link.solid.size, "give a length")
     for name, at in link.solid.faces.items() if link.solid is not None else ():

@@ -164,6 +164,9 @@ class Shell(Record, frozen=True):
         Stiffness by which the surface takes rotations about its normal along, in shares of G times the thickness.
     mass : str
         ``consistent`` with the interpolation of the elements, or ``lumped`` at the nodes.
+    mesh_error : float
+        Largest error of the first elastic frequencies by the mesh, estimated, as a share: beyond it the health check
+        fails. Beside ``[solid]`` that one counts.
     ignore : list of str
         Keywords, cards and types of elements of the mesh file that the link is to be without.
     """
@@ -178,4 +181,5 @@ class Shell(Record, frozen=True):
     nodes: dict[str, Vector] = {}
     drilling: float = 0.01
     mass: str = "consistent"
+    mesh_error: float = 0.05
     ignore: list[str] = []

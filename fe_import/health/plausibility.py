@@ -17,6 +17,7 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array
 
+_HEAVY = 1000.0  # point masses per mass of the elements that carry them
 _THIN = 0.1  # a model of beams has no thickness: a tenth of its length encloses it
 
 
@@ -183,6 +184,13 @@ def plausible_link(
         checks.append(_FREQUENCY.check(first_frequency, place))
         checks.append(_SPEED.check(first_frequency * size, place))
     return tuple(checks)
+
+
+def plausible_masses(added: float, own: float) -> HealthCheck:
+    """Point masses beside the elements that carry them [kg]: reported, as some links are meant to weigh nothing."""
+    share = added / own if own > 0 else NO_LIMIT
+    slip = " (g read as kg? units.mass holds for [[masses]], too)" if share > _HEAVY else ""
+    return HealthCheck(f"point masses per mass of what carries them{slip}", share, _HEAVY)
 
 
 def plausible_materials(

@@ -20,12 +20,15 @@ from fe_import.modal.model import NO_LIMIT, HealthCheck
 from fe_import.model import Array, FEModel
 from fe_import.models.measures import GROUNDING, asymmetry, grounding, negative_diagonal
 from fe_import.reduction import Basis
+from fe_import.reduction.base import HeldSolution
+from fe_import.reduction.free_body import free_body
 from fe_import.solver.sparse import modes_below
 
 _ROUNDING = 1e-9  # symmetry, mass properties: sums of many terms of one sign in double precision
 _RIGID = 1e-5  # or what rounding allows; a loose or grounded part gives 1
 _RIGID_PRINTED = 1e-4  # the same with the 14 digits of exported text, which leave 1.2e-5 on the L of 100 hexahedra
 _LOOSE = 0.3  # a part that moves alone departs by 1
+_VALUES = 10_000_000  # of fields at a time
 _MARGIN = 10  # of rounding: a motion found by solving departs by 0.3 to 2 times its share
 _EIGEN = 1e-6
 _TOO_SLENDER = (
@@ -200,36 +203,35 @@ def _condition(mass: Array) -> float:
     return float(values[-1] / max(values[0], np.finfo(float).eps * values[-1]))
 
 
-def mode_residuals(model: FEModel, shapes: Array, omega: Array) -> Array:
-    """(m,) ‖Kφ - ω²Mφ‖ / ‖Kφ‖ of elastic modes over the independent dofs, each row scaled by its stiffness.
+def mode_residuals(model: FEModel, shapes: Array, omega: Array, held: HeldSolution | None) -> Array:
+    """(m,) by how much the frequencies of elastic modes are too high, as shares: ½ rᵀK⁺r / φᵀKφ, r = Kφ - ω²Mφ.
 
-    0 for rigid-body modes; the scale makes forces and moments comparable.
+    Modes of a basis leave forces r that do no work in it, and ω² falls by the energy of what these move, as long as
+    modes of the whole model that are missing lie far above; near them it falls by more. 0 for rigid-body modes.
+
+    Parameters
+    ----------
+    model : FEModel
+    shapes : (d, m) array
+        Mass-orthonormal modes.
+    omega : (m,) array
+        [rad/s]
+    held : HeldSolution or None
+        Where there are factors already; forces in balance have the same energy in any support.
     """
     result = np.zeros(len(omega))
-    scale = 1 / np.sqrt(np.where((d := _independent_diagonal(model)) > 0, d, d.max()))
-    for k in range(6, len(omega)):  # one at a time: fields of a large model are long
-        force = _independent(model, model.stiffness @ shapes[:, k]) * scale
-        inertia = _independent(model, model.mass @ shapes[:, k]) * scale * omega[k] ** 2
-        result[k] = np.linalg.norm(force - inertia) / np.linalg.norm(force)
-    return result
+    held = held or free_body(model, model.source).held
+    step = max(1, _VALUES // shapes.shape[0])
+    for start in range(6, len(omega), step):  # fields of a large model are long
+        some = slice(start, start + step)
+        inertia = model.mass @ shapes[:, some] * omega[some] ** 2
+        left = _independent(model, model.stiffness @ shapes[:, some] - inertia)
+        result[some] = np.einsum("dk,dk->k", left, held(left, 0)) / (2 * omega[some] ** 2)
+    return result.clip(min=0)
 
 
 def _independent(model: FEModel, forces: Array) -> Array:
     return forces if model.coupling is None else np.asarray(model.coupling.T @ forces)
-
-
-def _independent_diagonal(model: FEModel) -> Array:
-    """(f,) diagonal of Cᵀ K C; products only for columns of C with several entries."""
-    diagonal, coupling = np.asarray(model.stiffness.diagonal()), model.coupling
-    if coupling is None:
-        return diagonal
-    result = np.zeros(coupling.shape[1])
-    counts = np.diff(coupling.indptr)
-    at = coupling.indptr[:-1][counts == 1]
-    result[counts == 1] = coupling.data[at] ** 2 * diagonal[coupling.indices[at]]
-    several = coupling[:, counts > 1]
-    result[counts > 1] = several.multiply(model.stiffness @ several).sum(axis=0)
-    return result
 
 
 def check_reduction(

@@ -98,7 +98,7 @@ def write_modal_group(group: h5py.Group, model: ModalModel) -> None:
     for name, values, unit, description in (
         ("frequencies_hz", model.frequencies_hz, "Hz", "frequency of each mode, 0 for rigid-body modes"),
         ("damping_ratios", model.damping_ratios, "1", "modal damping ratios"),
-        ("residuals", model.residuals, "1", "|K u - w^2 M u| / |K u| of each mode in the full model"),
+        ("residuals", model.residuals, "1", "by how much each frequency is too high, as a share"),
         ("nodes", model.nodes, "m", "undeformed positions in the mesh frame; node, axis"),
         ("mode_shapes/translation", model.translation_shapes, "m", "displacements; node, axis, mode"),
         ("mode_shapes/rotation", model.rotation_shapes, "rad", "rotations; rotation node, axis, mode"),

@@ -13,6 +13,7 @@ from fe_import.modal.thermal import ThermalExpansion
 from fe_import.model import Array, IntArray, InterfaceNode, Surface
 
 NO_LIMIT = float(np.finfo(np.float64).max)  # a figure that is reported, not judged; finite, as all in a file
+MESH_ERROR = "error of the first frequencies by the mesh"  # begin of the name of the check that estimates it
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,8 @@ class ModalModel:
     damping_ratios : (m,) array
         Modal damping; 0 unless the link description gives it.
     residuals : (m,) array
-        ‖Kφ - ω²Mφ‖ / ‖Kφ‖ of each elastic mode in the full model: 0 for a mode of it, 1 for a shape that is none.
+        By how much the frequencies are too high, as shares of them, by the forces that each mode leaves in the full
+        model; 0 for a mode of it.
     full_mass_properties : MassProperties
         Of the full finite-element model, for comparison.
     fixed_interface : FixedInterfaceModes

@@ -65,8 +65,8 @@ QUESTIONS = {
 
 @pytest.mark.parametrize("question", QUESTIONS)
 def test_shape_of_times_stands_in_front(run: ChainRun, question: str) -> None:
-    """A scalar, a list, a matrix and no times at all; the same values one by one, but for the order in which products of
-    matrices of other numbers of rows are summed.
+    """A scalar, a list, a matrix and no times at all; the same values one by one, but for the order of sums in products
+    of matrices.
     """
     ask, shape = QUESTIONS[question]
     found = ask(run, TIMES)

@@ -158,4 +158,4 @@ def test_linear_elements_are_refused(tmp_path):
 
 def test_without_elastic_modes(tmp_path):
     model = build_model(solid_link(tmp_path))
-    assert check_mesh_error(model, model.stress, np.zeros((3, 6)), np.zeros(6), 0.05, "link.toml") == ()
+    assert check_mesh_error(model, [model.stress], np.zeros((3, 6)), np.zeros(6), 0.05, "link.toml") == ()

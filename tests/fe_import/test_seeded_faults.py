@@ -208,6 +208,12 @@ FAULTS = {
     "frame: sections in mm": frame(
         "thickness per size of the link", "mm read as m", sections={"s": {"width": 10.0, "height": 20.0}}
     ),
+    "frame: point mass in g": frame(
+        "point masses per mass of what carries them",
+        "g read as kg",
+        reported=True,
+        masses=[{"node": "tip", "mass": 5000.0}],
+    ),
     "frame: modulus in MPa": frame("Young's modulus", "MPa", materials={"m": {"youngs_modulus": 7e4}}),
     "frame: density in g/cm3": frame("density", "g/cm³", materials={"m": {"density": 2.7}}),
     "frame: aluminium with the density of steel": frame(
