@@ -19,7 +19,8 @@ from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chose
 from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
-from fe_import.solver.multifrontal import OutsidePattern, bytes_needed, negative_pivots
+from fe_import.solver.multifrontal import bytes_needed, negative_pivots
+from fe_import.solver.pieces import OutsidePattern
 from fe_import.solver.products import times
 from fe_import.solver.watch import Progress, say
 

@@ -12,7 +12,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from clamped_boxes import MESHES, clamped, silent
 
-from fe_import.solver import analyse, layout, multifrontal, products
+from fe_import.solver import SingularMatrix, analyse, layout, multifrontal, pieces, products
 from fe_import.solver.sparse import factorize, lowest_modes, modes_below
 from fe_import.solver.threads import side_by_side, threads
 
@@ -21,8 +21,8 @@ from fe_import.solver.threads import side_by_side, threads
 def many_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small matrices are cut into pieces as large ones are, and the largest fronts are shared by all threads."""
     monkeypatch.setattr(layout, "_LEAST", 1.0)
-    monkeypatch.setattr(multifrontal, "_WIDE", 1e6)
-    monkeypatch.setattr(multifrontal, "_STRIP", 100)
+    monkeypatch.setattr(pieces, "_WIDE", 1e6)
+    monkeypatch.setattr(pieces, "_STRIP", 100)
     monkeypatch.setattr(products, "_LARGE", 1)
     monkeypatch.setattr(products, "_STRIP", 500)
 
@@ -91,7 +91,7 @@ def test_singular_fronts_above_the_pieces(many_pieces: None) -> None:
     first = lowest_modes(model.stiffness, model.mass, 3, "x", positions=model.positions)[0]
     loose = (model.stiffness - first[0] * first[2] * model.mass).tocsc()
     for matrix in (loose, sp.csc_array(model.stiffness * -1)):
-        with pytest.raises(multifrontal.SingularMatrix):
+        with pytest.raises(SingularMatrix):
             multifrontal.factorize(matrix, analyse(matrix, model.positions), silent)
     factorize(model.stiffness, "x", model.positions)
 
