@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -133,3 +137,30 @@ def test_an_interrupted_factorization_starts_afresh(many_pieces: None, monkeypat
     with pytest.raises(KeyboardInterrupt):
         multifrontal.factorize(model.stiffness, elimination, interrupted)
     np.testing.assert_array_equal(multifrontal.factorize(model.stiffness, elimination, silent).solve(right), expected)
+
+
+_PLAIN = """
+import sys
+import numpy as np
+from clamped_boxes import clamped
+from fe_import.solver.sparse import factorize, modes_below
+model = clamped("tet10", (10, 2, 2), (1.0, 0.2, 0.2))
+solve = factorize(model.stiffness, "x", model.positions)
+right = np.random.default_rng(0).standard_normal((model.stiffness.shape[0], 2))
+np.save(sys.argv[1], solve(right))
+assert modes_below(model.stiffness, model.mass, 5e6, elimination=solve.elimination) == int(sys.argv[2])
+assert "numba" not in sys.modules
+"""
+
+
+def test_the_same_source_runs_as_plain_python(tmp_path: Path) -> None:
+    """With ERLS_JIT=0 nothing is compiled, and solutions agree to rounding times the condition."""
+    model = clamped("tet10", (10, 2, 2), (1.0, 0.2, 0.2))
+    solve = factorize(model.stiffness, "x", model.positions)
+    expected = solve(np.random.default_rng(0).standard_normal((model.stiffness.shape[0], 2)))
+    count = modes_below(model.stiffness, model.mass, 5e6, elimination=solve.elimination)
+    assert count == 2
+    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": str(Path(__file__).parent)}
+    command = [sys.executable, "-c", _PLAIN, str(tmp_path / "x.npy"), str(count)]
+    subprocess.run(command, check=True, env=environment)
+    np.testing.assert_allclose(np.load(tmp_path / "x.npy"), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
