@@ -22,6 +22,7 @@ from fe_import.solver.memory import gigabytes, refuse_too_large
 from fe_import.solver.multifrontal import bytes_needed, negative_pivots
 from fe_import.solver.pieces import OutsidePattern
 from fe_import.solver.products import times
+from fe_import.solver.threads import one_thread_each
 from fe_import.solver.watch import Progress, say
 
 __all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_below", "polishing"]
@@ -174,7 +175,8 @@ def lowest_modes(
     else:
         refuse_too_large(vectors, f"iteration for {count} modes of the {what}, {size} dofs,")
     try:
-        mu, modes = lowest_eigenpairs(solve, mass, count)
+        with one_thread_each():  # those of the linear algebra wait for work on the processors of ours
+            mu, modes = lowest_eigenpairs(solve, mass, count)
     except NotConverged:
         raise FEImportError(
             Cause.EIGENSOLVER, f"modes of the {what} did not converge", value=count, remedy="ask for fewer modes"
