@@ -151,7 +151,7 @@ def in_own_process(case: str, folder: Path, peers: str, threads: str, repeats: i
     environment = {**os.environ, **dict.fromkeys(variables, threads)}
     done = subprocess.run(command, capture_output=True, encoding="utf-8", env=environment)
     if done.returncode:
-        return {"missing": done.stderr.strip().splitlines()[-1]}
+        return {"missing": (done.stderr.strip() or f"ended with {done.returncode}").splitlines()[-1]}
     return dict(json.loads(done.stdout.splitlines()[-1]))
 
 

@@ -48,5 +48,6 @@ def pytest_configure(config: pytest.Config) -> None:
 def _modules() -> deque[str]:
     """Those whose functions are compiled when they are imported, packages together."""
     root = Path(__file__).parents[1]
-    files = [f for f in sorted((root / "erls").rglob("*.py")) if _COMPILED.search(f.read_text(encoding="utf-8"))]
+    every = sorted([*(root / "erls").rglob("*.py"), *(root / "fe_import").rglob("*.py")])
+    files = [f for f in every if _COMPILED.search(f.read_text(encoding="utf-8"))]
     return deque(".".join(f.relative_to(root).with_suffix("").parts) for f in files)

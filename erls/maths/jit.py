@@ -21,7 +21,6 @@ from types import FunctionType
 from typing import Any, TypeVar, cast
 
 import numpy as np
-import platformdirs
 
 F = TypeVar("F", bound=Callable[..., Any])
 
@@ -42,14 +41,13 @@ def folder(module: str) -> Path:
     """Folder for the compiled code of this very source: Numba does not notice changes in what a function calls."""
     import numba
 
+    from fe_import.compiled.jit import kernels_folder
     from fe_import.compiled.kernel_cache import FORMAT
 
     digest = hashlib.sha256(f"{numba.__version__} {np.__version__} {FORMAT}".encode())
     for name in _reads(module):
         digest.update(_source(name)[0])
-    given = os.environ.get("ERLS_KERNELS") or os.environ.get("ERLS_CACHE")
-    base = Path(given) if given else Path(platformdirs.user_cache_dir("erls", appauthor=False))
-    return base / f"kernels-{_subject(module)}-{digest.hexdigest()[:16]}"
+    return kernels_folder(_subject(module), digest.hexdigest()[:16])
 
 
 def _file(module: str) -> Path:

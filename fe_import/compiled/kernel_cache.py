@@ -82,8 +82,8 @@ class _SealedFiles(IndexDataCacheFile):  # type: ignore[misc]  # Numba has no an
 class _Folder(UserProvidedCacheLocator):  # type: ignore[misc]
     """The folder of `numba.config.CACHE_DIR` and no other one, which would know nothing of what a function calls.
 
-    Its name tells the source (`erls.maths.jit.folder`), so that it does not matter where that lies: a second checkout
-    or environment compiles nothing anew.
+    Its name tells the source (`fe_import.compiled.jit.kernels_folder`), so that it does not matter where that lies: a
+    second checkout or environment compiles nothing anew.
     """
 
     @classmethod

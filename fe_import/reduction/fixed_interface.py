@@ -13,6 +13,7 @@ from fe_import.model import Array, FEModel, IntArray, eliminated
 from fe_import.reduction.base import HeldSolution, expanded, interface_places
 from fe_import.solver.products import times
 from fe_import.solver.sparse import Factorization, factorize
+from fe_import.solver.threads import one_thread_each
 
 
 @dataclass(frozen=True)
@@ -68,8 +69,9 @@ class Partition:
 
     def static(self, loads: Array) -> Array:
         """Response of the inner dofs to loads on them, interfaces clamped, with one step of iterative refinement."""
-        found = self.solve(loads)
-        return np.asarray(found + self.solve(loads - times(self.inner_stiffness, found)))
+        with one_thread_each():
+            found = self.solve(loads)
+            return np.asarray(found + self.solve(loads - times(self.inner_stiffness, found)))
 
     @cached_property
     def solve(self) -> Factorization:

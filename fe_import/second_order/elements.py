@@ -23,7 +23,7 @@ from fe_import.second_order.composition import composed_rotation, twice_turned
 from fe_import.second_order.moments import LEVI_CIVITA, of_inertia, of_modes, of_moments
 from fe_import.solver.sparse import factorize
 
-_BLOCK_VALUES = 20_000_000  # of test fields held at a time
+_BLOCK_VALUES = 45_000_000  # of test fields held at a time
 
 
 Work = Callable[[Array, Array, IntArray, IntArray], Array]  # of tests (d, p), fields (d, n) and pairs, (p, pairs)

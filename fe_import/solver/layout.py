@@ -111,19 +111,21 @@ class Layout:
 
     def peak_bytes(self, keep: bool, threads: int) -> int:
         """Memory of an elimination at its largest, the factor included where it is kept."""
+        places = int(self.table[-1, FIRST]) // 2  # of 32 bits, counted in numbers of 64
         kept, waiting, peak = 0, 0, 0
         left = [sum(int(self.across[root]) ** 2 for root in piece.roots) for piece in self.pieces]
-        widest = int(self.own @ np.ones(len(self.own), dtype=np.int64)) // 2  # 32-bit places, in numbers of 64
         for wave in self.waves:
-            busy = wave[:threads]
-            panels = [self.pieces[number].panel_size for number in wave]
-            working = len(busy) * (max(self.pieces[number].rest_size for number in wave) + widest)
-            working += 0 if keep else len(busy) * max(self._largest_panel(self.pieces[number]) for number in wave)
-            kept += sum(panels) if keep else 0
-            peak = max(peak, kept + waiting + working + sum(left[number] for number in wave))
-            waiting += sum(left[number] for number in wave)
+            working = [places + self._working(self.pieces[number], keep) for number in wave]
+            for k, number in enumerate(wave):
+                kept += self.pieces[number].panel_size if keep else 0
+                waiting += left[number]
+                peak = max(peak, kept + waiting + sum(working[max(0, k + 1 - threads) : k + 1]))
             waiting -= sum(self._consumed(number) for number in wave)
         return 8 * max(peak, kept)
+
+    def _working(self, piece: Piece, keep: bool) -> int:
+        """Numbers that are given up when a piece is done; fronts above others leave their matrix as it is."""
+        return (0 if piece.wave else piece.rest_size) + (0 if keep else self._largest_panel(piece))
 
     def _largest_panel(self, piece: Piece) -> int:
         own, across = self.own[piece.first : piece.stop], self.across[piece.first : piece.stop]

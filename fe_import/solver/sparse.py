@@ -19,8 +19,10 @@ from fe_import.solver import Elimination, Factor, SingularMatrix, analyse, chose
 from fe_import.solver.dense import dense_modes, polishing, singular_matrix
 from fe_import.solver.lanczos import NotConverged, lowest_eigenpairs, most_vectors
 from fe_import.solver.memory import gigabytes, refuse_too_large
-from fe_import.solver.multifrontal import OutsidePattern, bytes_needed, negative_pivots
+from fe_import.solver.multifrontal import bytes_needed, negative_pivots
+from fe_import.solver.pieces import OutsidePattern
 from fe_import.solver.products import times
+from fe_import.solver.threads import one_thread_each
 from fe_import.solver.watch import Progress, say
 
 __all__ = ["Factorization", "dense_modes", "factorize", "lowest_modes", "modes_below", "polishing"]
@@ -173,7 +175,8 @@ def lowest_modes(
     else:
         refuse_too_large(vectors, f"iteration for {count} modes of the {what}, {size} dofs,")
     try:
-        mu, modes = lowest_eigenpairs(solve, mass, count)
+        with one_thread_each():  # those of the linear algebra wait for work on the processors of ours
+            mu, modes = lowest_eigenpairs(solve, mass, count)
     except NotConverged:
         raise FEImportError(
             Cause.EIGENSOLVER, f"modes of the {what} did not converge", value=count, remedy="ask for fewer modes"

@@ -22,6 +22,7 @@ from fe_import.errors import Cause, FEImportError
 from fe_import.solver import SOLVERS, SingularMatrix, analyse, multifrontal
 from fe_import.solver.dense import dense_modes
 from fe_import.solver.lanczos import block_size
+from fe_import.solver.pieces import OutsidePattern
 from fe_import.solver.sparse import factorize, lowest_modes, modes_below
 
 INSTALLED = [s.name for s in SOLVERS.values() if not s.package or importlib.util.find_spec("sksparse")]
@@ -190,7 +191,7 @@ def test_masses_that_couple_what_no_stiffness_does() -> None:
     values = la.eigh(model.stiffness.toarray(), mass.toarray(), eigvals_only=True)
     shift = np.sqrt(values[9] * values[10])
     elimination = factorize(model.stiffness, "x").elimination
-    with pytest.raises(multifrontal.OutsidePattern):
+    with pytest.raises(OutsidePattern):
         multifrontal.negative_pivots(model.stiffness, elimination, silent, mass, shift)
     assert modes_below(model.stiffness, mass, shift, elimination=elimination) == 10
 

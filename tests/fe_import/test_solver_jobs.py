@@ -15,7 +15,7 @@ import fe_import.solver
 import fe_import.solver.sparse
 from fe_import.errors import Cause, FEImportError
 from fe_import.reduce import reduce_link, reduction_summary
-from fe_import.solver import SOLVERS, analyse, memory, multifrontal, watch
+from fe_import.solver import SOLVERS, analyse, memory, multifrontal, pieces, watch
 from fe_import.solver.sparse import factorize, lowest_modes, modes_below
 
 
@@ -40,7 +40,7 @@ def test_fill_is_counted_before_it_is_there(mesh: str) -> None:
 @pytest.mark.parametrize("keep", [True, False])
 @pytest.mark.parametrize("mesh", MESHES)
 def test_memory_is_known_beforehand(mesh: str, keep: bool) -> None:
-    """Peak of what is allocated during a factorization and a count: within 0.8 and 1.3 of what was predicted."""
+    """Peak of what is allocated during a factorization and a count: within 15 % of what was predicted."""
     model = clamped(*MESHES[mesh])
     elimination = analyse(model.stiffness, model.positions)
     tracemalloc.start()
@@ -53,7 +53,7 @@ def test_memory_is_known_beforehand(mesh: str, keep: bool) -> None:
         peak = tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
-    assert 0.8 < peak / multifrontal.bytes_needed(elimination, keep) < 1.3
+    assert 1 / 1.15 < peak / multifrontal.bytes_needed(elimination, keep) < 1.15
 
 
 @pytest.mark.parametrize("job", ["factorize", "modes", "more modes", "all modes", "count"])
@@ -121,7 +121,7 @@ def test_long_jobs_are_announced(monkeypatch: pytest.MonkeyPatch) -> None:
     model = clamped(*MESHES["cube of hex20"])
     monkeypatch.setattr(fe_import.solver.sparse, "_ANNOUNCED", 0.0)
     monkeypatch.setattr(watch, "_INTERVAL", 0.0)
-    monkeypatch.setattr(multifrontal, "_SLICE", 1.0)  # one front
+    monkeypatch.setattr(pieces, "_SLICE", 1.0)  # one front
     heard: list[str] = []
     with watch.telling(heard.append), watch.telling(None):
         solve = factorize(model.stiffness, "stiffness of the cube", model.positions)

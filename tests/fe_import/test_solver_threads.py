@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+import os
+import subprocess
+import sys
 import threading
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +16,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 from clamped_boxes import MESHES, clamped, silent
 
-from fe_import.solver import analyse, layout, multifrontal, products
+from fe_import.solver import SingularMatrix, analyse, layout, multifrontal, pieces, products
 from fe_import.solver.sparse import factorize, lowest_modes, modes_below
 from fe_import.solver.threads import side_by_side, threads
 
@@ -21,8 +25,8 @@ from fe_import.solver.threads import side_by_side, threads
 def many_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
     """Small matrices are cut into pieces as large ones are, and the largest fronts are shared by all threads."""
     monkeypatch.setattr(layout, "_LEAST", 1.0)
-    monkeypatch.setattr(multifrontal, "_WIDE", 1e6)
-    monkeypatch.setattr(multifrontal, "_STRIP", 100)
+    monkeypatch.setattr(pieces, "_WIDE", 1e6)
+    monkeypatch.setattr(pieces, "_STRIP", 100)
     monkeypatch.setattr(products, "_LARGE", 1)
     monkeypatch.setattr(products, "_STRIP", 500)
 
@@ -91,7 +95,7 @@ def test_singular_fronts_above_the_pieces(many_pieces: None) -> None:
     first = lowest_modes(model.stiffness, model.mass, 3, "x", positions=model.positions)[0]
     loose = (model.stiffness - first[0] * first[2] * model.mass).tocsc()
     for matrix in (loose, sp.csc_array(model.stiffness * -1)):
-        with pytest.raises(multifrontal.SingularMatrix):
+        with pytest.raises(SingularMatrix):
             multifrontal.factorize(matrix, analyse(matrix, model.positions), silent)
     factorize(model.stiffness, "x", model.positions)
 
@@ -133,3 +137,30 @@ def test_an_interrupted_factorization_starts_afresh(many_pieces: None, monkeypat
     with pytest.raises(KeyboardInterrupt):
         multifrontal.factorize(model.stiffness, elimination, interrupted)
     np.testing.assert_array_equal(multifrontal.factorize(model.stiffness, elimination, silent).solve(right), expected)
+
+
+_PLAIN = """
+import sys
+import numpy as np
+from clamped_boxes import clamped
+from fe_import.solver.sparse import factorize, modes_below
+model = clamped("tet10", (10, 2, 2), (1.0, 0.2, 0.2))
+solve = factorize(model.stiffness, "x", model.positions)
+right = np.random.default_rng(0).standard_normal((model.stiffness.shape[0], 2))
+np.save(sys.argv[1], solve(right))
+assert modes_below(model.stiffness, model.mass, 5e6, elimination=solve.elimination) == int(sys.argv[2])
+assert "numba" not in sys.modules
+"""
+
+
+def test_the_same_source_runs_as_plain_python(tmp_path: Path) -> None:
+    """With ERLS_JIT=0 nothing is compiled, and solutions agree to rounding times the condition."""
+    model = clamped("tet10", (10, 2, 2), (1.0, 0.2, 0.2))
+    solve = factorize(model.stiffness, "x", model.positions)
+    expected = solve(np.random.default_rng(0).standard_normal((model.stiffness.shape[0], 2)))
+    count = modes_below(model.stiffness, model.mass, 5e6, elimination=solve.elimination)
+    assert count == 2
+    environment = {**os.environ, "ERLS_JIT": "0", "PYTHONPATH": str(Path(__file__).parent)}
+    command = [sys.executable, "-c", _PLAIN, str(tmp_path / "x.npy"), str(count)]
+    subprocess.run(command, check=True, env=environment)
+    np.testing.assert_allclose(np.load(tmp_path / "x.npy"), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
