@@ -35,9 +35,9 @@ def test_estimate_against_known_errors(
     monkeypatch: pytest.MonkeyPatch, scene: str, known: float, others: float
 ) -> None:
     """Distance of a converged linear modal model from exact beams (docs/studies.md), of which ``others`` remain with
-    all effects, being no error of linear links: the estimate is right within a factor of 2.5, and none is worth a warning.
-    It asks for no second-order data; of links taken as straight beams between their interfaces, as the L is not, it is
-    the same within a factor of 3.
+    all effects, being no error of linear links: the estimate is right within a factor of 2.5, and none is worth a
+    warning. It asks for no second-order data; of links taken as straight beams between their interfaces, as the L is
+    not, it is the same within a factor of 3.
     """
     run = erls.simulate(erls.load_scene(DATA / scene, [scenes.LINEAR]), verdict=False)
     estimate = link_errors(run).total
