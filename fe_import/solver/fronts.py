@@ -21,7 +21,7 @@ from fe_import.model import Array, IntArray
 from fe_import.solver.blocks import cholesky, divide, invert, subtract_product, subtract_square
 from fe_import.solver.layout import CHILDREN, FIRST, PANEL, REST, ROWS
 
-BLOCK = 256
+BLOCK = 1024  # narrower ones cost slender links digits: substitution beside inverses is less exact than either
 Places: TypeAlias = NDArray[np.int32]  # 32 bits
 _MATRIX = "int64[::1], int32[::1], float64[::1]"
 _TREE = "int64[:, ::1], int64[::1], int64[::1], int64[::1], int32[::1]"

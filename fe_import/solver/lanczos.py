@@ -115,6 +115,6 @@ def _orthonormal(vectors: Array, blocks: list[Array], mass: sp.csc_array) -> tup
         kept = size > least
         least = 0.1
         turn, size = turn[:, kept], size[kept]
-        new, weighted = new @ (turn / size), weighted @ (turn / size)
+        new, weighted = (products.combined(fields, turn / size) for fields in (new, weighted))
         across = (turn * size).T @ across
     return new, weighted, along, across

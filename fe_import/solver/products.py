@@ -51,6 +51,15 @@ def take_out(fields: Array, blocks: Sequence[Array], parts: Array) -> None:
     side_by_side(take, strips(len(fields)))
 
 
+def combined(fields: Array, change: Array) -> Array:
+    """(n, m) combinations of fields (n, k) by a change (k, m)."""
+    result = np.empty((len(fields), change.shape[1]))
+    side_by_side(
+        lambda ends: np.matmul(fields[slice(*ends)], change, out=result[slice(*ends)]), strips(len(fields))
+    )
+    return result
+
+
 def strips(count: int) -> list[tuple[int, int]]:
     """Ranges of rows."""
     return [(low, min(low + _STRIP, count)) for low in range(0, count, _STRIP)]

@@ -164,3 +164,11 @@ def test_the_same_source_runs_as_plain_python(tmp_path: Path) -> None:
     command = [sys.executable, "-c", _PLAIN, str(tmp_path / "x.npy"), str(count)]
     subprocess.run(command, check=True, env=environment)
     np.testing.assert_allclose(np.load(tmp_path / "x.npy"), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+
+
+def test_fronts_wider_than_a_block(many_pieces: None) -> None:
+    """A full matrix is one front of several blocks."""
+    random = np.random.default_rng(0).standard_normal((1300, 1300))
+    matrix = sp.csc_array(random @ random.T + 1300 * np.eye(1300))
+    right = np.arange(2600.0).reshape(1300, 2)
+    np.testing.assert_allclose(matrix @ factorize(matrix, "x")(right), right, rtol=0, atol=1e-9)
