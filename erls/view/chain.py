@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -17,9 +17,11 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.joint_types import single
 from erls.mechanism.links import Link
 from erls.mechanism.loops import LoopEnd
+from erls.mechanism.sensors.base import Node
 from erls.run.chain.places import node_positions, rigid_frames, rigid_positions, surface_positions
 from erls.run.chain.run import ChainRun
-from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
+from erls.view.figure import DEFLECTION, Arrow, Figure, Part, PartMesh, Pose, Shade
+from erls.view.marks import Acting, arrows, loads_of, sensor_places
 from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surface, link_outline, plane_surface
 from erls.view.stress import chain_values
 from fe_import.model import IntArray
@@ -81,11 +83,17 @@ class ChainFigure(Figure):
     def poses(self, times: Sequence[float] | Array) -> list[ChainPose]:
         """The chain at each time."""
         mechanism, states = self.run.formulation.mechanism, self.run.states(list(times))
+        marks = zip(states, loads_of(self.run, times), strict=True)
+        plain = [ChainPose(at.time, mechanism, at, tuple(acting), self._sensors) for at, acting in marks]
         if self.shade is DEFLECTION:
-            return [ChainPose(state.time, mechanism, state) for state in states]
+            return plain
         found = chain_values(self.run, times, self.shade)
         each = [[None if own is None else own[k] for own in found] for k in range(len(states))]
-        return [ChainPose(at.time, mechanism, at, self.shade, own) for at, own in zip(states, each, strict=True)]
+        return [replace(pose, shade=self.shade, held=own) for pose, own in zip(plain, each, strict=True)]
+
+    @cached_property
+    def _sensors(self) -> dict[str, Node | str]:
+        return sensor_places(self.run)
 
     def paths(self, times: Array, magnification: float) -> list[Array]:
         """All times at once."""
@@ -96,11 +104,15 @@ class ChainFigure(Figure):
 
 @dataclass(frozen=True)
 class ChainPose(Pose):
-    """A chain in a state, with what colours say at the nodes of its links, None of those without."""
+    """A chain in a state, with what acts on it, where sensors are, and what colours say at the nodes of its links, None
+    of those without.
+    """
 
     time: float
     mechanism: Mechanism
     state: State
+    acting: tuple[Acting, ...] = ()
+    watching: Mapping[str, Node | str] = field(default_factory=dict)
     shade: Shade = DEFLECTION
     held: list[Array | None] | None = None
 
@@ -147,6 +159,25 @@ class ChainPose(Pose):
         if moving:  # hinges on the ground stay where they are
             places = [place for place in places if place.inner_node is not None or place.type != "revolute"]
         return joints_surface(places, unit) if places else None
+
+    def loads(self, magnification: float) -> list[Arrow]:
+        """On nodes, and on centres of mass."""
+        return arrows(self.mechanism, self.state, self.acting, magnification)
+
+    def sensors(self, magnification: float) -> dict[str, Array]:
+        """On nodes and joints."""
+        names = [joint.name for joint in self.mechanism.joints]
+        names += [loop.name for loop in self.mechanism.loops if loop.holds_frames]
+        joints: dict[str, Array] = {}
+        if any(isinstance(at, str) for at in self.watching.values()):
+            seen = joint_places(self.mechanism, self.state, magnification)
+            seen += closing_places(self.mechanism, self.state, magnification)
+            joints = {name: place.inner[:3, 3] for name, place in zip(names, seen, strict=True)}
+        places = {
+            name: joints.get(at) if isinstance(at, str) else self._nodes(at.link, magnification, [at.node])[0]
+            for name, at in self.watching.items()
+        }
+        return {name: place for name, place in places.items() if place is not None}
 
     def outline(self) -> list[Any]:
         """The links without displacement: the Equivalent Rigid Link System."""

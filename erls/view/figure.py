@@ -8,7 +8,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -60,6 +60,14 @@ class Part:
     sharp: bool = False
 
 
+class Arrow(NamedTuple):
+    """A load: (3,) place where it acts, (3,) arrow [m], and whether it is a moment."""
+
+    place: Array
+    along: Array
+    turns: bool
+
+
 @dataclass(frozen=True)
 class PartMesh:
     """A link, beam or body for ParaView: (n, 3) points, cells by kind, true displacements (n, 3) [m], and what else is
@@ -106,6 +114,14 @@ class Pose(ABC):
     @abstractmethod
     def joints(self, magnification: float, unit: float, moving: bool) -> Any:
         """Joints as one surface, None without; ``moving``: without those that stay where they are."""
+
+    def loads(self, magnification: float) -> list[Arrow]:
+        """What acts on it."""
+        return []
+
+    def sensors(self, magnification: float) -> dict[str, Array]:
+        """(3,) places of what watches it, by name."""
+        return {}
 
     @abstractmethod
     def outline(self) -> list[Any]:

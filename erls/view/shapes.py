@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from erls.maths.so3 import Array
+from erls.view.figure import Arrow
 from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
 
@@ -302,6 +303,27 @@ def ground_surface(place: Array, towards: Array, unit: float) -> Any:
             parts += rod(start, end, 0.28 * unit)
             parts += rod(start[[1, 0, 2]], end[[1, 0, 2]], 0.28 * unit)
     return joined([with_normals(p) for p in parts]).transform(place, inplace=False)
+
+
+def load_surface(arrow: Arrow) -> Any:
+    """An arrow, of a moment with two heads."""
+    import pyvista as pv
+
+    length = float(np.linalg.norm(arrow.along))
+    heads = (1.0, 0.8) if arrow.turns else (1.0,)
+    parts = [
+        pv.Arrow(start=arrow.place, direction=arrow.along, scale=share * length, tip_length=0.18 / share,
+                 tip_radius=0.06 / share, shaft_radius=0.02 / share, tip_resolution=24, shaft_resolution=16)
+        for share in heads
+    ]  # fmt: skip
+    return joined([with_normals(part) for part in parts])
+
+
+def sensor_surface(place: Array, unit: float) -> Any:
+    """An octahedron."""
+    import pyvista as pv
+
+    return pv.PlatonicSolid("octahedron", radius=2.6 * unit, center=place)
 
 
 def plane_surface(corners: Array) -> Any:

@@ -11,13 +11,14 @@ import numpy as np
 from erls.maths.so3 import Array
 from erls.view.camera import Box, Camera, Pixels, Size, Walls, text_unit
 from erls.view.figure import Figure, Pose
-from erls.view.shapes import SHARP, polylines, with_normals
+from erls.view.shapes import SHARP, load_surface, polylines, sensor_surface, with_normals
 
 COLOURS = "turbo"  # its dark ends are cut
 UNKNOWN = "#b4bac2"
 GHOST = (0.42, 0.50, 0.60)
 PARTS = ("#3d6b99", "#c26a2d", "#4f8a5b", "#8a5a96", "#a04848", "#4a8f95")
 POINTS = ("#b3123f", "#1d4e89", "#2f7d32", "#7b3fa0", "#a65a00", "#00707a")
+LOADS, SENSORS = "#d4a017", "#0b7285"
 _PATH_SAMPLES = 1001
 _BOX_SAMPLES = 201
 
@@ -63,6 +64,7 @@ class Motion:
         for p in seen:
             for positions in p.nodes(magnification):
                 extent += [positions.min(axis=0), positions.max(axis=0)]
+            extent += [end for load in p.loads(magnification) for end in (load.place, load.place + load.along)]
             if shown is None or p is shown[-1]:
                 largest = max(largest, *(float(np.fmax.reduce(x, initial=0.0)) for x in p.values()))
         points = np.concatenate([np.array(extent), *paths])
@@ -208,6 +210,9 @@ class Stage:
             actors.append(self._add(joints, color=GHOST if ghost else "#596069"))
         if not ghost:
             actors += self._dots(pose)
+            actors += [self._add(load_surface(load), color=LOADS) for load in pose.loads(self.magnification)]
+            places = pose.sensors(self.magnification).values()
+            actors += [self._add(sensor_surface(place, motion.unit), color=SENSORS) for place in places]
             if self.magnification != 1.0:
                 actors += [self._add(m, color="#777777", line_width=1.0 * self.line) for m in pose.outline()]
         self._actors["pose"] = actors

@@ -13,7 +13,7 @@ from erls.run.record import Run
 from erls.view.camera import Pixels, text_unit
 from erls.view.figure import Pose
 from erls.view.labels import Label, Sheet
-from erls.view.stage import POINTS, Stage, colour_map
+from erls.view.stage import POINTS, SENSORS, Stage, colour_map
 
 
 def written(stage: Stage, pixels: Pixels, caption: str) -> Sheet:
@@ -52,11 +52,14 @@ def caption(run: Run, poses: Sequence[Pose], magnification: float, speed: float 
 
 
 def point_labels(stage: Stage, pose: Pose) -> list[Label]:
-    """Names of the points, beside them."""
+    """Names of the points and of the sensors, beside them."""
     names, result = stage.figure.run.point_names, []
     for k, (name, place) in enumerate(zip(names, pose.points(stage.magnification), strict=True)):
         x, y = stage.camera.project(place)
         result.append(Label(name, name, (float(x), float(y)), POINTS[k % len(POINTS)], bold=True))
+    for name, place in pose.sensors(stage.magnification).items():
+        x, y = stage.camera.project(place)
+        result.append(Label(f"sensor {name}", name, (float(x), float(y)), SENSORS, scale=0.9))
     return result
 
 

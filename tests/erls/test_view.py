@@ -11,7 +11,7 @@ import imageio_ffmpeg
 import numpy as np
 import pytest
 from PIL import Image, ImageSequence
-from scenes import ROOT
+from scenes import ROOT, write_toml
 
 import erls
 from erls.errors import Cause, SceneError, SimulationError
@@ -21,7 +21,8 @@ from erls.view.camera import Box, Camera, Walls
 from erls.view.chain import closing_places, joint_places
 from erls.view.checks import surveyed
 from erls.view.figures import figure_of
-from erls.view.shapes import chains, joints_surface
+from erls.view.marks import LONGEST
+from erls.view.shapes import chains, joints_surface, load_surface
 from erls.view.stage import Motion
 from erls.view.window import Window
 
@@ -284,3 +285,36 @@ def test_closing_joints_and_planes_are_drawn(tmp_path: Path) -> None:
     _, plane = figure_of(ball).ground(np.array([0.0, -1.0, 0.0]), 0.01)
     np.testing.assert_allclose(np.asarray(plane.points)[:, 2], 0.0, atol=1e-12)
     np.testing.assert_allclose(np.asarray(plane.points).mean(axis=0), 0.0, atol=1e-12)
+
+
+def test_loads_are_arrows_and_sensors_have_places(tmp_path: Path) -> None:
+    """Loads point as they act, outside of their link and as long as they are large; a follower turns with its link, a
+    force on all mass begins at its middle. Sensors sit on their points and joints.
+    """
+    fades = {"shape": "trapezoid", "start": 0.0, "rise": 0.0, "hold": 0.0, "fall": 0.1, "value": 1.0}
+    push = {"point": "tip", "force": [-3.0, 0.0, 0.0], "axes": "link", "factor": [fades]}
+    turning = {"point": "tip", "moment": [0.0, 0.0, 2.0]}
+    blown = {"link": "l", "force_per_mass": [0.0, 0.0, -6.0]}
+    drive = {"type": "motion", "motion": {"shape": "polynomial", "from": 0.0, "to": 1.0, "duration": 0.1}}
+    sensors = [{"name": "imu", "type": "accelerometer", "point": "tip"}]
+    sensors += [{"name": "encoder", "type": "joint_angle", "joint": "j"}]
+    joints = [{"name": "j", "dh": {"convention": "standard", "a": 1.0}, "drive": drive}]
+    body = {"mass": 0.25, "centre_of_mass": [-0.5, 0.0, 0.0], "inertia": [1e-3] * 3}
+    links = [{"name": "l", "rigid": {**body, "points": {"root": [-1.0, 0.0, 0.0], "tip": [0.0, 0.0, 0.0]}}}]
+    points = [{"name": "tip", "link": "l", "node": "tip"}]
+    data = {"joints": joints, "links": links, "points": points, "loads": [push, turning, blown], "sensors": sensors}
+    scene = write_toml(tmp_path / "s.toml", {**data, "simulation": {"duration": 0.1, "step": 1e-3}})
+    first, middle = figure_of(erls.simulate(scene, verdict=False)).poses([0.0, 0.05])
+    tip = middle.points(1.0)[0]
+    np.testing.assert_allclose(tip, [np.cos(0.5), np.sin(0.5), 0.0], atol=1e-9)
+    outside, turned, pull = middle.loads(1.0)
+    np.testing.assert_allclose(outside.along, -0.5 * LONGEST * tip, atol=1e-9)  # half of the largest force, at the start
+    np.testing.assert_allclose(outside.place + outside.along, tip, atol=1e-9)
+    np.testing.assert_allclose(turned.along, [0.0, 0.0, LONGEST], atol=1e-9)
+    np.testing.assert_allclose(pull.place, tip / 2, atol=1e-9)
+    np.testing.assert_allclose(pull.along, [0.0, 0.0, -0.5 * LONGEST], atol=1e-9)  # 1.5 N
+    assert [load.turns for load in (outside, turned, pull)] == [False, True, False]
+    assert np.linalg.norm(first.loads(1.0)[0].along) == pytest.approx(LONGEST)
+    np.testing.assert_allclose(middle.sensors(1.0)["imu"], tip)
+    np.testing.assert_allclose(middle.sensors(1.0)["encoder"], 0.0, atol=1e-12)
+    assert len(load_surface(turned).points) > len(load_surface(pull).points)  # two heads
