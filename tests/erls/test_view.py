@@ -308,7 +308,7 @@ def test_loads_are_arrows_and_sensors_have_places(tmp_path: Path) -> None:
     tip = middle.points(1.0)[0]
     np.testing.assert_allclose(tip, [np.cos(0.5), np.sin(0.5), 0.0], atol=1e-9)
     outside, turned, pull = middle.loads(1.0)
-    np.testing.assert_allclose(outside.along, -0.5 * LONGEST * tip, atol=1e-9)  # half of the largest force, at the start
+    np.testing.assert_allclose(outside.along, -0.5 * LONGEST * tip, atol=1e-9)  # half of the largest, that at the start
     np.testing.assert_allclose(outside.place + outside.along, tip, atol=1e-9)
     np.testing.assert_allclose(turned.along, [0.0, 0.0, LONGEST], atol=1e-9)
     np.testing.assert_allclose(pull.place, tip / 2, atol=1e-9)
