@@ -139,7 +139,7 @@ def _reduced(model: FEModel, link: LinkFile) -> ModalModel:
     checks += check_reduction(model, shapes, reduced_stiffness, modes.omega, invariants, rounding, where)
     checks += refuse_slips(_unit_checks(model, modes.omega, where), unusual, where)
     checks += _mesh_checks(model, link, shapes, modes.omega)
-    residuals = mode_residuals(model, shapes, modes.omega, basis.held)
+    residuals = mode_residuals(model, shapes, modes.omega, held)
     kinds = mode_kinds(model, shapes, basis, modes.coordinates, stiffness)
     field, statement = None, "not available in physical form"
     if options.form == "physical":
