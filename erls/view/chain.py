@@ -20,9 +20,9 @@ from erls.mechanism.loops import LoopEnd
 from erls.mechanism.sensors.base import Node
 from erls.run.chain.places import node_positions, rigid_frames, rigid_positions, surface_positions
 from erls.run.chain.run import ChainRun
-from erls.view.figure import DEFLECTION, Arrow, Figure, Part, PartMesh, Pose, Shade
+from erls.view.figure import DEFLECTION, Figure, Part, PartMesh, Pose, Shade
 from erls.view.marks import Acting, arrows, loads_of, sensor_places
-from erls.view.shapes import JointPlace, drawn_link, ground_surface, joints_surface, link_outline, plane_surface
+from erls.view.shapes import Arrow, JointPlace, drawn_link, ground_surface, joints_surface, link_outline, plane_surface
 from erls.view.stress import chain_values
 from fe_import.model import IntArray
 

@@ -8,12 +8,13 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from erls.maths.so3 import Array
 from erls.run.record import Run
+from erls.view.shapes import Arrow
 
 
 @dataclass(frozen=True)
@@ -58,14 +59,6 @@ class Part:
 
     surface: Any
     sharp: bool = False
-
-
-class Arrow(NamedTuple):
-    """A load: (3,) place where it acts, (3,) arrow [m], and whether it is a moment."""
-
-    place: Array
-    along: Array
-    turns: bool
 
 
 @dataclass(frozen=True)

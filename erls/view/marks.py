@@ -15,7 +15,7 @@ from erls.mechanism.loads import CENTRE, PointLoad
 from erls.mechanism.sensors.base import Node
 from erls.run.chain.places import node_positions
 from erls.run.chain.run import ChainRun
-from erls.view.figure import Arrow
+from erls.view.shapes import Arrow
 
 LONGEST = 0.25
 """Arrow of the largest load of a run, of the size of the largest link."""

@@ -4,18 +4,25 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
 from erls.maths.so3 import Array
-from erls.view.figure import Arrow
 from fe_import.modal.model import ModalModel
 from fe_import.model import IntArray
 
 _SMOOTH = math.cos(math.radians(20.0))  # a frame that turns more at a node has a corner there
 SHARP = 35.0  # [deg]; a surface that turns more has an edge there
 _SIDES = 24
+
+
+class Arrow(NamedTuple):
+    """A load: (3,) place where it acts, (3,) arrow [m], and whether it is a moment."""
+
+    place: Array
+    along: Array
+    turns: bool
 
 
 @dataclass(frozen=True)
