@@ -93,7 +93,7 @@ def evaluate(task: Task) -> list[Row]:
     """Run them; what fails is a row, too.
 
     First all are read, then all are run, then all are asked for their numbers: what is done between two integrations
-    takes a third longer where each of them has driven it out of the processor's cache.
+    takes a fifth longer where each of them has driven it out of the processor's cache.
     """
     scenes = [_scene(task, values) for _, values in task.rows]
     runs = [_run(task, number, scene) for (number, _), scene in zip(task.rows, scenes, strict=True)]
