@@ -244,7 +244,7 @@ def label(cut: Cut) -> str:
 def compared(scene: erls.Scene, whole: Mechanism, choice: Choice, reference: ChainRun) -> tuple[float, float]:
     """Actual and certified error of a run without something."""
     run = erls.simulate(named(scene, whole, choice))
-    return distance(run, reference), certify(run, whole).error
+    return distance(run, reference), certify(run, following(run, whole)).error
 
 
 def ratio(actual: float, certified: float) -> float:

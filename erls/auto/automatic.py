@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import msgspec
 
-from erls.auto.certify import certify
+from erls.auto.certify import certify, following
 from erls.auto.choice import Choice, choose_effects
 from erls.errors import Cause, SimulationError
 from erls.maths.jit import announcing
@@ -168,7 +168,7 @@ def _certified(run: ChainRun, whole: Mechanism, choice: Choice) -> Certificate:
     if not choice.rigid and not choice.bandwidth and choice.off.isdisjoint(present(whole)):
         return Certificate(0.0, None, *tolerances)
     try:
-        return certify(run, whole)
+        return certify(run, following(run, whole))
     except SimulationError as problem:
         if problem.cause == Cause.INTERRUPTED:
             raise

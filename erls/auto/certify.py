@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -10,8 +11,9 @@ import numpy as np
 from erls.auto.coordinates import embedded, kept_places, same_start
 from erls.auto.error_motion import Deviation, Knots, error_motion
 from erls.auto.outputs import Outputs, busiest, effort_error, largest_distance, watched_nodes
-from erls.auto.resolution import resolution, vibrations
+from erls.auto.resolution import Resolution, Vibrations, resolution, vibrations
 from erls.auto.static import vibrating_efforts
+from erls.equations.formulation import Formulation
 from erls.equations.quick import quick
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
@@ -30,33 +32,76 @@ _ACCURACY = 1e-2  # of the tolerance
 _EVEN = 1.01  # ratio of steps that count as equal
 
 
-def certify(run: ChainRun, whole: Mechanism) -> Certificate:
+@dataclass(frozen=True)
+class Following:
+    """How the error of what a run left out is followed.
+
+    Attributes
+    ----------
+    whole : Mechanism
+        With all effects.
+    formulation : Formulation
+        Its equations.
+    kept : (m,) int array
+        Places of the run's coordinates among theirs.
+    start : (n,), (n,) arrays
+        Error and its rate at the start.
+    found : Vibrations
+        What the scene sets off.
+    wanted : Resolution
+        How finely they are looked at.
+    steps : int
+        Over the whole run.
+    """
+
+    whole: Mechanism
+    formulation: Formulation
+    kept: IntArray
+    start: tuple[Array, Array]
+    found: Vibrations
+    wanted: Resolution
+    steps: int
+
+
+def following(run: ChainRun, whole: Mechanism) -> Following:
+    """What it takes to follow the error of a run that left out effects.
+
+    Raises
+    ------
+    SimulationError
+        SINGULAR_MASS.
+    """
+    settings = run.scene.record.simulation
+    formulation = formulate(whole, settings)
+    system = solved(formulation)
+    kept = kept_places(whole, run.formulation.mechanism, system.size)
+    begun = [embedded(x[0], kept, system.size) for x in (run.solution.y, run.solution.v)]
+    begin = begun if same_start(whole, run.formulation.mechanism) else formulation.initial_state()
+    found = vibrations(quick(system), whole, settings.duration, *begin)
+    wanted = resolution(found, UNRESOLVED * settings.effects_tolerance)
+    start = (begin[0] - begun[0], begin[1] - begun[1])
+    return Following(whole, formulation, kept, start, found, wanted, wanted.count(settings.duration, FEWEST))
+
+
+def certify(run: ChainRun, followed: Following) -> Certificate:
     """Estimate the error of a run that left out effects.
 
     Parameters
     ----------
     run : ChainRun
-    whole : Mechanism
-        With all effects.
+    followed : Following
 
     Raises
     ------
     SimulationError
         The error cannot be followed.
     """
-    settings = run.scene.record.simulation
-    formulation = formulate(whole, settings)
+    settings, whole, formulation = run.scene.record.simulation, followed.whole, followed.formulation
     system, reduced = solved(formulation), solved(run.formulation)
-    kept = kept_places(whole, run.formulation.mechanism, system.size)
-    begun = [embedded(x[0], kept, system.size) for x in (run.solution.y, run.solution.v)]
-    begin = begun if same_start(whole, run.formulation.mechanism) else formulation.initial_state()
-    start = (begin[0] - begun[0], begin[1] - begun[1])
-    found = vibrations(quick(system), whole, settings.duration, *begin)
-    wanted = resolution(found, UNRESOLVED * settings.effects_tolerance)
-    step = settings.duration / wanted.count(settings.duration, FEWEST)
-    legs, strides = _legs(run, step)
+    kept, found, wanted = followed.kept, followed.found, followed.wanted
+    legs, strides = _legs(run, settings.duration / followed.steps)
     accuracy = _ACCURACY * settings.effects_tolerance
-    deviation = error_motion(system, reduced, kept, legs, start, strides, accuracy)  # type: ignore[arg-type]
+    deviation = error_motion(system, reduced, kept, legs, followed.start, strides, accuracy)  # type: ignore[arg-type]
     watched = watched_nodes(whole)
     ours = Outputs(run.scene, run.formulation, watched)
     others = Outputs(run.scene, formulation, watched)
