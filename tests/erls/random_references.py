@@ -32,7 +32,7 @@ from random_statements import FLOOR
 
 from erls.errors import Cause, SceneError, SimulationError
 from erls.maths.so3 import Array
-from erls.mechanism.effects import in_order
+from erls.mechanism.effects import ALL, in_order
 from erls.run.chain.run import ChainRun
 from erls.run.watches.base import NOTHING, Finding, Knots, Watch
 from erls.run.watches.checkpoint import Checkpoint
@@ -210,7 +210,8 @@ def _judged(judge: Judge, row: dict[str, Any], parts: str, nodal_s: float, work:
         return
     formulation = scene.tables["simulation"]["formulation"]
     if scene.tables["simulation"]["effects"] == "auto":  # those that it chose
-        scene = judge.scene = scene.changed({"effects": in_order(run.formulation.mechanism.effects)})
+        chosen = run.formulation.mechanism.effects
+        scene = judge.scene = scene.changed({"effects": "all" if chosen == ALL else in_order(chosen)})
     tight = judge.reference("tight", tightened(scene, formulation, TIGHT), end)
     best = judge.reference("tighter", tightened(scene, formulation, TIGHTER), end)
     row["actual"] = {"integration": _growing(own, best)}
