@@ -60,9 +60,7 @@ def stated_bodies(run: BodyMotion | BodyRest) -> BodyMotion | BodyRest:
     mesh, why = mesh_error(run)
     if mesh is None:
         unjudged["modes"] = why
-    accuracy = Accuracy(
-        found, mesh, 0.0, 0.0, 0.0, horizon=horizon, judged_at=run.point_names, unjudged=unjudged
-    )
+    accuracy = Accuracy(found, mesh, 0.0, 0.0, 0.0, horizon=horizon, judged_at=run.point_names, unjudged=unjudged)
     breaches = []
     if isinstance(run, BodyMotion):
         breaches = [audit.text for audit in body_audits(run, accuracy.integration) if not audit.ok]
@@ -75,7 +73,7 @@ def mesh_error(run: BodyRun) -> tuple[float | None, str]:
     if not (scene.record.beams or scene.record.shells):
         return 0.0, ""
     try:
-        own, finer = _both(run, _refined(scene))
+        own, finer = _both(run, refined(scene))
     except SimulationError as problem:
         if problem.cause == Cause.INTERRUPTED:
             raise
@@ -84,7 +82,7 @@ def mesh_error(run: BodyRun) -> tuple[float | None, str]:
     return SHARE * apart, ""
 
 
-def _refined(scene: BodyScene) -> BodyScene:
+def refined(scene: BodyScene) -> BodyScene:
     """The same with `FINER` times the elements; inner nodes that are named keep their places."""
     record = scene.record
 

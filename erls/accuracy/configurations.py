@@ -9,10 +9,12 @@ import scipy.linalg as la
 
 from erls.accuracy.compared_links import Compared
 from erls.accuracy.slow_motion import Parted
+from erls.equations.system import metre_scales
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 CONFIGURATIONS = 3  # if links turn against each other
+_SMALL_MOVE = 1e-6  # m, of differences
 
 
 @dataclass(frozen=True)
@@ -28,6 +30,8 @@ class Configuration:
     y, v : (N,) arrays
         Nothing of what is left out.
     mass, stiffness, damping : (N, N) arrays
+    pressed : (N, N) array or None
+        What loads add to the stiffness, which need not be symmetric: links that they press are softer.
     rows : (m, N) array
         Conditions of loops.
     squares : (x,) array
@@ -43,6 +47,7 @@ class Configuration:
     mass: Array
     stiffness: Array
     damping: Array
+    pressed: Array | None
     rows: Array
     squares: Array
     fields: Array
@@ -62,9 +67,26 @@ def _configuration(compared: Compared, motion: Parted, stretch: IntArray) -> Con
     mass = whole.mass_matrix(t, y) if tied is None else tied.masses(t, y)
     stiffness, damping = whole.stiffness_and_damping(t, y, v)
     stiffness, damping = (stiffness + stiffness.T) / 2, (damping + damping.T) / 2
+    pressed = _of_loads(compared, t, y, stiffness) if whole.mechanism.loads else None
     rows = np.zeros((0, whole.size)) if tied is None else tied.closure(t, y, v).rows[:, whole.free]
     block = np.ix_(compared.rest, compared.rest)
     squares, fields = np.zeros(0), np.zeros((0, 0))
     if len(compared.rest):
         squares, fields = la.eigh(stiffness[block], mass[block], check_finite=False)
-    return Configuration(stretch, t, y, v, mass, stiffness, damping, rows, squares, fields)
+    return Configuration(stretch, t, y, v, mass, stiffness, damping, pressed, rows, squares, fields)
+
+
+def _of_loads(compared: Compared, t: float, y: Array, stiffness: Array) -> Array:
+    """(N, N) what loads, and the weight of links, add to their stiffness in elastic coordinates, at rest."""
+    whole, joints = compared.whole, compared.free
+    places = np.arange(joints, whole.size)
+    step = _SMALL_MOVE / metre_scales(whole)[places]
+    moved = np.repeat(y[None], 2 * len(places), axis=0)
+    moved[np.arange(len(places)), places] += step
+    moved[len(places) + np.arange(len(places)), places] -= step
+    rest = np.zeros_like(moved)
+    after, before = np.split(compared.forces(np.full(len(moved), t), moved, rest, rest), 2)
+    result = np.zeros_like(stiffness)
+    block = np.ix_(places, places)
+    result[block] = ((after - before) / (2 * step[:, None])).T[places] - stiffness[block]
+    return result

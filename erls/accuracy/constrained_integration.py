@@ -3,7 +3,9 @@
 Motions of bodies, nodal chains and absolute coordinates choose their steps by such companions and keep the last one.
 Runs of fixed steps, and those read from files, get one here, with `LARGER` times their steps: about a quarter of their
 work; where Newton's method does not bear that, one with half as large ones, at twice their work.
-`erls.integrate.step_distance` says how the distance of both becomes an error.
+`erls.integrate.step_distance` says how the distance of both becomes an error. That takes errors to be in proportion,
+which those of a sudden start are not where it sets off what larger steps do not resolve (joints that follow their
+motors within a step): the first steps of a run are held against a quarter of them.
 """
 
 from __future__ import annotations
@@ -40,6 +42,7 @@ SMALLER = 0.5
 
 _HALVED = 0.02  # of the steps of a companion, at most, that Newton's method may refuse
 _FORCES = 8  # instants at which they are compared
+_FIRST, _FINER = 10, 0.25  # steps of a run that are made anew; the length of theirs, of its own
 _TOO_LIKE = 1.4  # ratio of steps below which a distance says nothing
 
 
@@ -112,10 +115,8 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
     looks = samples(s.t)
     t, radius = s.t[looks], run.scene.record.simulation.spectral_radius  # type: ignore[union-attr]  # a motion's
     forces: tuple[Array | None, Array | None] = None, None
-    if isinstance(run, BodyMotion):
-        names, places, other = _of_bodies(run, looks, companion)
-    else:
-        names, places, other = _of_chain(run, looks, companion)
+    names, places, other = _places(run, looks, companion)
+    if isinstance(run, ChainRun):
         forces = _forces(run, companion, STATED if ratio < _TOO_LIKE else 1.0)
     touches = run.formulation.mechanism.touches if isinstance(run, ChainRun) else bool(run.scene.record.contacts)
     if ratio < _TOO_LIKE or touches:
@@ -125,6 +126,9 @@ def constrained_integration_error(run: ChainRun | BodyMotion) -> ConstrainedErro
         return ConstrainedError(names, t, share * apart, evaluations, *forces)
     bands = distance_bands(t, places, other, s.work.steps, ratio, radius)
     errors = STATED * errors_over_time(bands, beyond=companion.beyond)
+    if s.companion is None:
+        begun, more = _of_first_steps(run)
+        errors, evaluations = np.maximum(errors, np.outer(bands.t > s.t[0], STATED * begun)), evaluations + more
     return ConstrainedError(names, bands.t, errors, evaluations, *forces)
 
 
@@ -146,16 +150,32 @@ def _companion(run: ChainRun | BodyMotion, larger: float) -> tuple[Companion | N
     return Companion(made.t, made.y, made.v, made.a), made.work.rhs_calls
 
 
-def _with_steps(run: ChainRun | BodyMotion, larger: float, most: float) -> Solution:
-    """The same with steps so many times as large, up to where the run ended, or more than so many are refused."""
+def _of_first_steps(run: ChainRun | BodyMotion) -> tuple[Array, int]:
+    """(points,) what the first steps are off [m], by smaller ones, and their evaluations; nothing where these fail."""
+    s = run.solution
+    end = float(s.t[0]) + _FIRST * (float(s.t[-1]) - float(s.t[0])) / s.work.steps
+    looks = np.flatnonzero(s.t <= min(end * (1 + 1e-9), s.t[-1]))
+    made = _with_steps(run, _FINER, np.inf, end)
+    if made.failure is not None and made.failure.cause == Cause.INTERRUPTED:
+        raise made.failure
+    other = Companion(made.t, made.y, made.v, made.a)
+    _, own, finer = _places(run, looks, other)
+    apart = np.linalg.norm(own - finer, axis=2)[s.t[looks] <= made.t[-1]]
+    return np.asarray(apart.max(axis=0, initial=0.0) / (1 - _FINER**2)), made.work.rhs_calls
+
+
+def _with_steps(run: ChainRun | BodyMotion, larger: float, most: float, end: float | None = None) -> Solution:
+    """The same with steps so many times as large, up to a time or where the run ended, or more than so many are
+    refused.
+    """
     s = run.solution
 
     def limit(t: float, knots: Callable[[], Solution]) -> None:
         if knots().work.rejected_steps > most:
             raise StopRun
 
-    times = float(s.t[0]), float(s.t[-1])
-    step = larger * (times[1] - times[0]) / s.work.steps
+    step = larger * (float(s.t[-1]) - float(s.t[0])) / s.work.steps
+    times = float(s.t[0]), float(s.t[-1]) if end is None else min(end, float(s.t[-1]))
     if isinstance(run, BodyMotion):
         system, analysis = run.assembly.system, run.scene.record.simulation
         assert isinstance(analysis, Dynamics)
@@ -164,6 +184,13 @@ def _with_steps(run: ChainRun | BodyMotion, larger: float, most: float) -> Solut
     settings = msgspec.structs.replace(run.scene.record.simulation, integrator=FIXED_STEP, step=step, output_step=None)
     integrate = integrator(run.formulation.mechanism, settings)
     return integrate(run.formulation, times, *run.formulation.initial_state(), options_of(settings), limit)
+
+
+def _places(
+    run: ChainRun | BodyMotion, looks: IntArray, companion: Companion
+) -> tuple[tuple[str, ...], Array, Array]:
+    """Names of the points, and their places (k, p, 3) in both runs."""
+    return _of_bodies(run, looks, companion) if isinstance(run, BodyMotion) else _of_chain(run, looks, companion)
 
 
 def _of_bodies(run: BodyMotion, looks: IntArray, companion: Companion) -> tuple[tuple[str, ...], Array, Array]:

@@ -56,8 +56,9 @@ def effects_error(run: ChainRun) -> tuple[float | None, str]:
     every_mode = with_all_modes(run)
     try:
         followed = following(every_mode, whole)
-        if not static and _PER_STEP * followed.steps > run.solution.work.rhs_calls:  # vibrations too fast to pay for
-            known = _from_a_run(run, whole)
+        evaluations = _PER_STEP * followed.steps
+        if not static and evaluations > run.solution.work.rhs_calls:  # vibrations too fast to pay for
+            known = _from_a_run(run, whole, evaluations)
             if known[0] is not None:
                 return known
         return certify(every_mode, followed).error, ""
@@ -67,10 +68,11 @@ def effects_error(run: ChainRun) -> tuple[float | None, str]:
         return None, f"what the effects left out would have changed could not be followed ({problem})"
 
 
-def _from_a_run(run: ChainRun, whole: Mechanism) -> tuple[float | None, str]:
-    """From a run with all effects, in coordinates along which errors are not followed."""
+def _from_a_run(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[float | None, str]:
+    """From a run with all effects, which may take so many evaluations."""
     formulation = solved(formulate(whole, run.scene.record.simulation))
-    found = other_run(run, formulation, replace(options_of(run.scene.record.simulation), output_step=None))
+    options = replace(options_of(run.scene.record.simulation), output_step=None)
+    found = other_run(run, formulation, options, most)
     if found is None:
         return None, "a run with all effects fails; use effects = 'all'"
     return float(_SHARE * distance_from(run, judged_nodes(run), formulation, found)[1][-1]), ""

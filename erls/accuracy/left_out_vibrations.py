@@ -1,10 +1,14 @@
 """What vibrations make of what links leave out: they run out of step, and carry it along.
 
 At some configurations, a mode ψ of the mechanism that was run, (K - ω² M) ψ = 0, bears the forces F = -ω² M_x ψ on what
-it leaves out (with those of loops). These lower its frequency: r = -δ(ω²)/ω² = Fᵀ (K_xx - ω² M_xx)⁻¹ F / (ω² ψᵀMψ). A
-vibration of amplitude a is after a time T out of phase by ½ r ω T, and then off by a |½ r ω T| or at most 2 a; one that
-damping takes away runs out of step as long as it lasts. What is left out follows it by -(K_xx - ω² M_xx)⁻¹ F, and
-vibrates by as much at frequencies of its own.
+it leaves out (with those of loops). These lower its frequency: r = -δ(ω²)/ω² = Gᵀ (K_xx - ω² M_xx)⁻¹ F / (ω² χᵀMψ),
+where χ and G are those of the transposed stiffness, ψ and F themselves unless loads follow the links. A vibration of
+amplitude a is after a time T out of phase by ½ r ω T, and then off by a |½ r ω T| or at most 2 a; one that damping
+takes away runs out of step as long as it lasts. What is left out follows it by -(K_xx - ω² M_xx)⁻¹ F, and vibrates by
+as much at frequencies of its own.
+
+Loads that press links are part of K; what they do to what is left out is of second order, of which it has no data, and
+taken to be to F as χᵀ K_p ψ, their part of the stiffness, to ω².
 
 The amplitude is the least of ψᵀ K y / ω², ψᵀ K v / ω³ and ψᵀ K a / ω⁴, of the motion less its slow part: as modes turn
 with the mechanism, quick vibrations spoil the accelerations of slow ones, and slow ones the places of quick ones.
@@ -23,10 +27,12 @@ from erls.accuracy.compared_links import Compared
 from erls.accuracy.configurations import Configuration
 from erls.accuracy.slow_motion import Parted
 from erls.maths.so3 import Array
+from fe_import.model import IntArray
 
 _RIGID = 1e-9  # of the largest ω²: a motion without stiffness
 _SMALL_MOVE = 1e-6  # m, of differences
 _CLOSE = 0.2  # of 1 - ω²/ω_x²: nearer to a mode left out, the change of frequency is not small
+_UNLIKE = 1e-9  # of the largest entry: a stiffness that is not symmetric, frequencies that are complex
 _DEPENDENT = 1e-9  # of the largest singular value: rows of loops that follow from others
 
 
@@ -78,28 +84,30 @@ class _Vibrations:
 def _vibrations(compared: Compared, motion: Parted, place: Configuration) -> _Vibrations:
     """Those of a stretch."""
     t, y, v, kept, rest = place.t, place.y, place.v, compared.kept, compared.rest
-    mass, stiffness, rows = place.mass, place.stiffness, place.rows
+    mass, stiffness, rows, pressed = place.mass, place.stiffness, place.rows, place.pressed
     own = np.ix_(kept, kept)
+    stiffness = stiffness if pressed is None else stiffness + pressed
     allowed = _allowed(rows[:, kept], np.diag(mass)[kept])
-    values, modes = la.eigh(allowed.T @ stiffness[own] @ allowed, allowed.T @ mass[own] @ allowed)
+    values, modes, duals = _modes(allowed.T @ stiffness[own] @ allowed, allowed.T @ mass[own] @ allowed)
     elastic = values > _RIGID * values.max(initial=0.0)
-    squares, modes = values[elastic], allowed @ modes[:, elastic]
+    squares, modes, duals = values[elastic], allowed @ modes[:, elastic], allowed @ duals[:, elastic]
     omega = np.sqrt(squares)
 
-    forces = stiffness[np.ix_(rest, kept)] @ modes - squares * (mass[np.ix_(rest, kept)] @ modes)
-    if len(rows):
-        left = stiffness[own] @ modes - squares * (mass[own] @ modes)
-        forces = forces + rows[:, rest].T @ np.linalg.lstsq(rows[:, kept].T, -left, rcond=_DEPENDENT)[0]
+    along = place.fields.T @ _forces(place, kept, rest, squares, modes, stiffness)
+    against = along
+    if pressed is not None:
+        against = place.fields.T @ _forces(place, kept, rest, squares, duals, stiffness.T)
+        more = 1 + np.abs(np.einsum("ij,ik,kj->j", duals, pressed[own], modes)) / squares
+        along, against = more * along, more * against
     beyond = place.squares[:, None]
     apart = np.maximum(np.abs(beyond - squares), _CLOSE * np.maximum(beyond, squares))
-    along = place.fields.T @ forces
-    change, following = (along**2 / apart).sum(axis=0) / squares, place.fields @ (along / apart)
+    change, following = np.abs(against * along / apart).sum(axis=0) / squares, place.fields @ (along / apart)
     if not compared.exact:
         before = compared.lesser.mass_matrix(t, y[compared.run])
         differs = mass[own] - before[np.ix_(compared.own, compared.own)]
-        change += np.abs(np.einsum("ij,ik,kj->j", modes, differs, modes))
+        change += np.abs(np.einsum("ij,ik,kj->j", duals, differs, modes))
 
-    bent = stiffness[own] @ modes
+    bent = stiffness[own].T @ duals
     kinds = [np.abs(part[place.stretch][:, compared.own] @ bent).max(axis=0) for part in motion.vibration]
     swing = np.min([kind / omega ** (2 + order) for order, kind in enumerate(kinds)], axis=0)
     every = np.zeros((2 * len(squares), compared.whole.size))
@@ -108,9 +116,37 @@ def _vibrations(compared: Compared, motion: Parted, place: Configuration) -> _Vi
     shifted = np.concatenate([y[None], y + step[:, None] * every])
     found = compared.moves(np.full(len(shifted), t), shifted, np.repeat(v[None], len(shifted), axis=0))
     moves, follows = np.split(np.linalg.norm(found[1:] - found[0], axis=2) / step[:, None], 2)
-    decay = np.einsum("ij,ik,kj->j", modes, place.damping[own], modes) / 2
+    decay = np.abs(np.einsum("ij,ik,kj->j", duals, place.damping[own], modes)) / 2
     lasting = 1 / np.maximum(np.e * decay, np.finfo(float).tiny)
     return _Vibrations(0.5 * change * omega, lasting, swing[:, None] * moves, swing[:, None] * follows)
+
+
+def _modes(stiffness: Array, mass: Array) -> tuple[Array, Array, Array]:
+    """ω² in rising order, modes ψ and those χ of the transposed stiffness, χᵀ M ψ = 1; (d,), (d, d) twice.
+
+    Loads that follow a link make both differ, the more the nearer two frequencies come to flutter; beyond it, where
+    vibrations grow, both are those of the symmetric part.
+    """
+    if np.abs(stiffness - stiffness.T).max(initial=0.0) > _UNLIKE * np.abs(stiffness).max(initial=0.0):
+        values, duals, modes = la.eig(stiffness, mass, left=True)
+        if np.abs(values.imag).max(initial=0.0) <= _UNLIKE * np.abs(values).max(initial=0.0):
+            order = np.argsort(values.real)
+            modes, duals = modes.real[:, order], duals.real[:, order]
+            return values.real[order], modes / np.einsum("ij,ik,kj->j", duals, mass, modes), duals
+    values, modes = la.eigh((stiffness + stiffness.T) / 2, mass)
+    return values, modes, modes
+
+
+def _forces(
+    place: Configuration, kept: IntArray, rest: IntArray, squares: Array, modes: Array, stiffness: Array
+) -> Array:
+    """(x, j) forces (K_xk - ω² M_xk) ψ of modes on what is left out, with those of loops."""
+    mass, rows, own, other = place.mass, place.rows, np.ix_(kept, kept), np.ix_(rest, kept)
+    forces = stiffness[other] @ modes - squares * (mass[other] @ modes)
+    if len(rows):
+        left = stiffness[own] @ modes - squares * (mass[own] @ modes)
+        forces = forces + rows[:, rest].T @ np.linalg.lstsq(rows[:, kept].T, -left, rcond=_DEPENDENT)[0]
+    return np.asarray(forces)
 
 
 def _allowed(rows: Array, mass: Array) -> Array:

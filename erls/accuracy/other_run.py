@@ -21,16 +21,18 @@ _PLACES = 60
 _MOST = 4  # times the evaluations of the run that another one may take
 
 
-def other_run(run: ChainRun, formulation: Formulation, options: Options, **more: Any) -> Solution | None:
-    """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes much
-    longer; ``more`` goes to what integrates.
+def other_run(
+    run: ChainRun, formulation: Formulation, options: Options, most: float = 0.0, **more: Any
+) -> Solution | None:
+    """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes more
+    than `_MOST` times its evaluations and than ``most``; ``more`` goes to what integrates.
 
     Raises
     ------
     SimulationError
         INTERRUPTED.
     """
-    most = _MOST * run.solution.work.rhs_calls
+    most = max(most, _MOST * run.solution.work.rhs_calls)
 
     def limit(t: float, knots: Callable[[], Solution]) -> None:
         if knots().work.rhs_calls > most:

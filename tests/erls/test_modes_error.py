@@ -218,6 +218,15 @@ def test_nodal_links_state_what_their_mesh_leaves_out(tmp_path: Path) -> None:
     assert 2 < errors[0] / errors[1] < 8  # second order would make it 4
 
 
+def test_a_column_near_flutter_is_judged_as_pressed(tmp_path: Path) -> None:
+    """Beck's column at 0.9 of its load: its second frequency is five times as far off by the mesh as without load."""
+    scene = scenes.ROOT / "data/beck/column.toml"
+    run = run_of(scene)
+    actual = distance(run, run_of(scene, *finer(tmp_path, scene, 3)))
+    assert actual > 2e-5
+    assert actual <= stated(run) <= 5 * actual
+
+
 def test_rigid_links_leave_nothing_out(tmp_path: Path) -> None:
     scenes.l_link(tmp_path)
     scene = scenes.l_scene(tmp_path, simulation={"duration": 0.05})

@@ -1,0 +1,65 @@
+"""What effects that a run leaves out would have changed: followed along the run, or told by a run that has them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import msgspec
+import pytest
+from scenes import ROOT
+
+import erls
+from erls.accuracy import left_out_effects
+from erls.accuracy.left_out_effects import effects_error
+from erls.auto.certify import certify, following
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.effects import ALL, in_order
+from erls.run.chain.run import ChainRun
+from erls.scene.build import build_mechanism
+
+L_SHAPE, ROBOT = ROOT / "data/l_shape/steel_flat.toml", ROOT / "data/robot/two_link.toml"
+APART = 1.3  # of both ways: a run with all effects counts 1.2 times, and has an error of integration
+
+
+def _without(path: Path, effect: str) -> ChainRun:
+    names = ",".join(f'"{name}"' for name in in_order(ALL - {effect}))
+    changes = [f"simulation.effects=[{names}]", "simulation.duration=0.3"]
+    run = erls.simulate(erls.load_scene(path, changes), verdict=False)
+    assert isinstance(run, ChainRun)
+    return run
+
+
+def _whole(run: ChainRun) -> Mechanism:
+    record = run.scene.record
+    every = msgspec.structs.replace(record.simulation, effects=in_order(ALL))
+    return build_mechanism(replace(run.scene, record=msgspec.structs.replace(record, simulation=every))).mechanism
+
+
+@pytest.mark.parametrize(("path", "effect"), [(L_SHAPE, "centrifugal_load"), (ROBOT, "gravity")])
+def test_a_run_with_all_effects_says_what_following_their_error_does(path: Path, effect: str) -> None:
+    """Within `APART`, by fewer evaluations: a run without gravity takes a tenth of one with it."""
+    run = _without(path, effect)
+    stated, why = effects_error(run)
+    assert not why
+    assert stated is not None
+    followed = following(run, _whole(run))
+    assert 4 * followed.steps > run.solution.work.rhs_calls
+    assert stated > 1e-5
+    assert 1 / APART <= stated / certify(run, followed).error <= APART
+
+
+def test_an_error_that_is_followed_in_fewer_steps_asks_for_no_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Two thousand steps of a fall take more evaluations than 500 steps of its error do."""
+    run = _without(L_SHAPE, "joint_damping")  # it has none: nothing is present, nothing is asked
+    assert effects_error(run) == (0.0, "")
+    names = ",".join(f'"{name}"' for name in in_order(ALL - {"gravity"}))
+    changes = [f"simulation.effects=[{names}]", "simulation.duration=0.02", "simulation.step=1e-5"]
+    run = erls.simulate(erls.load_scene(L_SHAPE, [*changes, "simulation.effects_tolerance=1"]), verdict=False)
+    assert isinstance(run, ChainRun)
+    assert run.solution.work.rhs_calls > 2000
+    monkeypatch.setattr(left_out_effects, "_from_a_run", None)
+    stated, _ = effects_error(run)
+    free_fall = 0.5 * 9.81 * 0.02**2
+    assert stated is not None
+    assert 0.5 * free_fall < stated < 3 * free_fall  # ends begin with at most 3/2 g
