@@ -20,7 +20,14 @@ from erls.accuracy.vibrations import FastModes, fast_modes, wrong_table
 from erls.auto.outputs import Watched
 from erls.equations.substructures import solved
 from erls.integrate.choice import options_of
-from erls.integrate.global_error import ENDS, ENDS_STIFF, GlobalError, global_error
+from erls.integrate.global_error import (
+    ENDS,
+    ENDS_STIFF,
+    MERGED_RIGID,
+    MERGED_SMOOTH,
+    GlobalError,
+    global_error,
+)
 from erls.maths.so3 import Array
 from erls.run.chain.run import ChainRun
 
@@ -78,6 +85,7 @@ def integration_error(run: ChainRun, watched: Watched) -> IntegrationError:
         _ROUNDING,
         solved(run.formulation).mechanism.rotation_vector_places,
         ENDS if rigid or s.work.steps < _MANY else ENDS_STIFF,
+        MERGED_RIGID if rigid else MERGED_SMOOTH,
     )
     return _estimate(run, watched, system, found)
 

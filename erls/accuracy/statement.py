@@ -18,6 +18,7 @@ from erls.accuracy.links import links_error
 from erls.accuracy.modes import modes_error
 from erls.accuracy.verdict import verdict
 from erls.auto.outputs import watched_nodes
+from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.errors import Cause, SimulationError
 from erls.integrate.choice import options_of
 from erls.run.accuracy import PARTS, Accuracy
@@ -70,8 +71,12 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
     )
     iterated = ITERATED * options_of(run.scene.record.simulation).tolerance  # what no audit need find
     granted = None if accuracy.integration is None else max(accuracy.integration, iterated)
+    static = isinstance(run.formulation, QuasiStatic)
+    if granted is not None and static:  # it keeps the energy but for what it leaves out
+        granted += accuracy.effects or 0.0
     breaches = [audit.text for audit in audits(run, granted) if not audit.ok]
-    trust = verdict(accuracy, breaches, tolerance, _REMEDIES, integrated.growth())
+    remedies = _REMEDIES | ({"effects": _OF_STATIC_MODES} if static else {})
+    trust = verdict(accuracy, breaches, tolerance, remedies, integrated.growth())
     return replace(run, accuracy=accuracy, trust=trust)
 
 
@@ -117,6 +122,7 @@ def _names(run: ChainRun) -> tuple[str, ...]:
     return tuple(f"{links[link].name}: {node}" for link, node in watched_nodes(run.formulation.mechanism))
 
 
+_OF_STATIC_MODES = "effects = 'all', and a larger simulation.bandwidth, or none"
 _REMEDIES = {
     "integration": "a smaller simulation.tolerance, or a smaller step",
     "modes": "more elastic_modes in the links' reductions, or finer meshes",

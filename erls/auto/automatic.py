@@ -10,6 +10,7 @@ import msgspec
 
 from erls.auto.certify import certify, following
 from erls.auto.choice import Choice, choose_effects
+from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.errors import Cause, SimulationError
 from erls.maths.jit import announcing
 from erls.mechanism.chain import Mechanism
@@ -18,7 +19,7 @@ from erls.mechanism.without_effects import present
 from erls.run.all_modes import with_all_modes
 from erls.run.chain.run import ChainRun
 from erls.run.watches.spin_stability import UNSTABLE
-from erls.run.watches.static_following import ABOVE
+from erls.run.watches.static_following import ABOVE, static_error
 from erls.scene.chain import Scene
 
 _KEPT = 0.1  # of the tolerance: what an estimate, scaled by what the certificate found, may take when a run is repeated
@@ -98,15 +99,21 @@ def _with_bandwidth(
     tell: Callable[[str], None],
     strict: bool,
 ) -> ChainRun:
-    """The same, where modes above a bandwidth of the scene follow statically: judged as if all modes moved."""
+    """The same, where modes above a bandwidth of the scene follow statically: effects are judged as if all modes moved,
+    and what these would have done is added.
+    """
     runs: list[ChainRun] = []
 
     def integrate_slow(scene: Scene, mechanism: Mechanism) -> ChainRun:
         runs.append(integrate(scene, replace(mechanism, bandwidth=whole.bandwidth)))
         return with_all_modes(runs[-1])
 
-    found = automatic(scene, replace(whole, bandwidth=None), integrate_slow, tell, strict)
-    return replace(runs[-1], warnings=found.warnings, certificate=found.certificate)
+    found, own = automatic(scene, replace(whole, bandwidth=None), integrate_slow, tell, strict), runs[-1]
+    known = static_error(own.formulation, own.solution) if isinstance(own.formulation, QuasiStatic) else None
+    certificate = found.certificate
+    if known is not None and certificate is not None:
+        certificate = replace(certificate, error=certificate.error + known.stated)
+    return replace(own, warnings=found.warnings, certificate=certificate)
 
 
 def _links_warnings(run: ChainRun) -> list[str]:

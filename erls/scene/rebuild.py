@@ -58,7 +58,7 @@ def _alike(now: SceneRecord, before: SceneRecord) -> bool:
     if now.loops or now.bushings or now.couplings or circuits(now) or len(now.joints) != len(before.joints):
         return False
     fields = (field for field in now.__struct_fields__ if field not in _MAY_DIFFER)
-    settings = (_of_mechanism(record) for record in (now, before))
+    settings = (settings_of_mechanism(record) for record in (now, before))
     return (
         next(settings) == next(settings)
         and all(getattr(now, field) == getattr(before, field) for field in fields)
@@ -66,7 +66,7 @@ def _alike(now: SceneRecord, before: SceneRecord) -> bool:
     )
 
 
-def _of_mechanism(record: SceneRecord) -> Sequence[object]:
+def settings_of_mechanism(record: SceneRecord) -> Sequence[object]:
     """What of the settings goes into a mechanism."""
     return record.simulation.effects, record.simulation.formulation, record.simulation.bandwidth
 

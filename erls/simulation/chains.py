@@ -24,7 +24,7 @@ from erls.run.watches.watching import Warnings, Watching
 from erls.scene.build import Built, Elements, build_mechanism
 from erls.scene.build_joints import led_by_inversion
 from erls.scene.chain import Scene
-from erls.scene.rebuild import rebuilt
+from erls.scene.rebuild import rebuilt, settings_of_mechanism
 from erls.simulation.asked import Asked
 from erls.simulation.kept import kept_to
 from erls.simulation.statements import with_statement
@@ -79,9 +79,9 @@ def run_chain(scene: Scene, asked: Asked) -> ChainRun:
 
 
 def _mechanism(scene: Scene, run: ChainRun, tell: Callable[[str], None]) -> Mechanism:
-    """That of a run, or one built anew where the scene has other links or effects."""
+    """That of a run, or one built anew where the scene has other links or settings that enter it."""
     now, before = scene.record, run.scene.record
-    if now.links == before.links and now.simulation.effects == before.simulation.effects:
+    if now.links == before.links and settings_of_mechanism(now) == settings_of_mechanism(before):
         return run.formulation.mechanism
     return build_mechanism(scene, tell).mechanism
 

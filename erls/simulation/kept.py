@@ -89,6 +89,8 @@ def _better(run: ChainRun, wanted: float) -> tuple[Scene, list[str]]:
         changes += ["more modes"] if links != record.links else []
     if lacking and large & {"effects", "links"}:
         settings, changes = msgspec.structs.replace(settings, effects="all"), [*changes, "all effects"]
+    if "effects" in large and settings.bandwidth is not None:
+        settings, changes = msgspec.structs.replace(settings, bandwidth=None), [*changes, "no bandwidth"]
     if "output" in large and settings.output_step is not None:
         settings = msgspec.structs.replace(settings, output_step=settings.output_step / _MORE)
         changes.append("output twice as often")

@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import msgspec
+import numpy as np
 import pytest
 from scenes import ROOT
 
@@ -63,3 +64,34 @@ def test_an_error_that_is_followed_in_fewer_steps_asks_for_no_run(monkeypatch: p
     free_fall = 0.5 * 9.81 * 0.02**2
     assert stated is not None
     assert 0.5 * free_fall < stated < 3 * free_fall  # ends begin with at most 3/2 g
+
+
+@pytest.mark.parametrize("effects", ["'all'", "'auto'"])
+def test_modes_that_follow_statically_state_what_that_leaves_out(effects: str) -> None:
+    """The L let go, modes above 50 Hz static: against a run in which all move; ``auto`` tells by what loads do."""
+    changes = [f"simulation.effects={effects}", "simulation.duration=0.3"]
+    run = erls.simulate(erls.load_scene(L_SHAPE, [*changes, "simulation.bandwidth=50"]))
+    whole = erls.simulate(erls.load_scene(L_SHAPE, ["simulation.duration=0.3", "simulation.tolerance=1e-6"]))
+    assert isinstance(run, ChainRun)
+    assert isinstance(whole, ChainRun)
+    assert run.accuracy is not None
+    assert run.accuracy.effects is not None
+    times = np.linspace(0.0, 0.3, 301)
+    apart = run.position("tip", times) - whole.position("tip", times)
+    actual = float(np.linalg.norm(apart, axis=1).max())
+    assert actual > 5e-6
+    assert actual <= run.accuracy.effects <= 20 * actual
+
+
+def test_a_strict_run_lets_all_modes_move_where_that_is_asked_for() -> None:
+    """Beyond the tolerance by what follows statically, within it without a bandwidth."""
+    changes = ["simulation.duration=0.3", "simulation.bandwidth=20"]
+    loose = erls.simulate(erls.load_scene(L_SHAPE, changes))
+    assert loose.trust is not None
+    assert loose.trust.verdict == "limited"
+    assert "bandwidth" in loose.trust.reasons[0]
+    run = erls.simulate(erls.load_scene(L_SHAPE, changes), strict=True)
+    assert isinstance(run, ChainRun)
+    assert run.trust is not None
+    assert run.trust.verdict == "good"
+    assert run.formulation.mechanism.bandwidth is None

@@ -23,6 +23,7 @@ from erls.run.watches.base import NOTHING, Ended, Finding, Plan, Watch
 ABOVE = "modes above the bandwidth"  # in warnings of an error beyond the tolerance
 _SAMPLES, _SAMPLES_UNCOMPILED = 30, 10
 _MOST_LEGS = 30
+_MARGIN = 8.0
 _PER_PERIOD = 40  # differences in time, of the period of the slowest static mode
 
 
@@ -67,6 +68,11 @@ class StaticError:
     def error(self) -> float:
         """Estimated error of points [m]."""
         return self.inertia + self.ringing
+
+    @property
+    def stated(self) -> float:
+        """The same with a margin [m]: points of twelve random scenes were 0.05 to 7.4 times as far from all modes."""
+        return _MARGIN * self.error
 
 
 def static_error(formulation: QuasiStatic, solution: Solution) -> StaticError | None:
