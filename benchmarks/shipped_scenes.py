@@ -40,6 +40,7 @@ import tomlkit
 import erls
 from erls.accuracy.bodies import refined
 from erls.errors import SceneError, SimulationError
+from erls.run.bodies.rest import BodyRest
 from erls.run.file import load_run
 from erls.run.record import Run
 from erls.scene.bodies.analyses import Dynamics
@@ -81,12 +82,14 @@ def stated(scene: Path, folder: Path) -> tuple[dict[str, Any], Run | None]:
 
 
 def axis_of(run: Run) -> Places:
-    """Where runs are compared: times, or shares of loads."""
+    """Times at which runs are compared."""
     return np.linspace(float(run.times[0]), float(run.times[-1]), SAMPLES)
 
 
 def places(run: Run, at: Places) -> Places:
-    """(k, points, 3) [m]"""
+    """(k, points, 3) [m]; of equilibria that under the whole load."""
+    if isinstance(run, BodyRest):
+        at = run.times[-1:]
     return np.stack([run.position(name, at) for name in run.point_names], axis=1)  # type: ignore[attr-defined]
 
 
