@@ -15,7 +15,8 @@ distance, of named points over the whole run, from
 - ``twice``: the same with twice the elements, where a mesh of four times would take too long.
 
 Doubts are what the references move by: from one refinement to the next, from a thirtieth of the tolerance, from twice
-the elements; of ``twice`` a third of what they move from the scene's own. Rows go to the file as they come, and scenes that stand there are not run again.
+the elements; of ``twice`` a third of what they move from the scene's own. Rows go to the file as they come, and scenes
+that stand there are not run again.
 """
 
 from __future__ import annotations
