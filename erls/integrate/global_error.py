@@ -141,8 +141,8 @@ def global_error(
                 e, rate = shifted[0] - solution.y[first], shifted[1] - solution.v[first]
         at = np.unique(np.append(np.arange(first, end, solution.nodes_per_step), end - 1))
         if len(at) > 1:
-            merged, found, whole = follower.leg(at, e, rate)
-            parts.append((solution.t[at[merged]], at[merged], found, follower.filters(solution.t[at[merged]])))
+            bounds, found, whole = follower.leg(at, e, rate)
+            parts.append((solution.t[at[bounds]], at[bounds], found, follower.filters(solution.t[at[bounds]])))
             e, rate = found[-1]
         before = end - 1
         if not whole:
