@@ -2,22 +2,29 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Set
+from dataclasses import replace
 from typing import Any
 
+import msgspec
 import numpy as np
 
-from erls.accuracy.judged_places import judged_places
+from erls.accuracy.judged_places import judged_nodes, judged_places
 from erls.auto.outputs import Watched
 from erls.equations.formulation import Formulation
+from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.errors import Cause
 from erls.integrate.base import Options, Solution, StopRun, hermite
-from erls.integrate.choice import integrator
+from erls.integrate.choice import integrator, options_of
 from erls.maths.so3 import Array
+from erls.mechanism.chain import Mechanism
+from erls.mechanism.effects import in_order
 from erls.run.chain.run import ChainRun
+from erls.scene.build import build_mechanism
 
 _PLACES = 60
+_SHARE = 1.2  # of the distance from other equations, whose run has an error of integration, too
 _MOST = 4  # times the evaluations of the run that another one may take
 
 
@@ -56,3 +63,31 @@ def distance_from(
         for of, s in ((solved(run.formulation), own), (formulation, other))
     )
     return looks, np.maximum.accumulate(np.linalg.norm(here - there, axis=-1).max(axis=1, initial=0.0))
+
+
+def mechanism_with(run: ChainRun, effects: Set[str]) -> Mechanism:
+    """The mechanism of a run with some effects more."""
+    record = run.scene.record
+    names = in_order(run.formulation.mechanism.effects | effects)
+    settings = msgspec.structs.replace(record.simulation, effects=names)
+    scene = replace(run.scene, record=msgspec.structs.replace(record, simulation=settings))
+    return build_mechanism(scene).mechanism
+
+
+def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[float | None, str]:
+    """What a run is off by the equations of another mechanism in the same formulation [m], or None, and why.
+
+    Parameters
+    ----------
+    run : ChainRun
+    whole : Mechanism
+        The same with more effects or modes.
+    most : float
+        Evaluations that it may take, where that is more than `_MOST` times those of the run.
+    """
+    formulation = solved(formulate(whole, run.scene.record.simulation))
+    options = replace(options_of(run.scene.record.simulation), output_step=None)
+    found = other_run(run, formulation, options, most)
+    if found is None:
+        return None, "a run with all effects fails; use effects = 'all'"
+    return float(_SHARE * distance_from(run, judged_nodes(run), formulation, found)[1][-1]), ""

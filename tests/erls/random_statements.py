@@ -58,7 +58,8 @@ def judged(row: Row, part: str = "total") -> float | None:
 
 
 def ratio(row: Row, part: str) -> float | None:
-    """Stated over actual error; None where either is missing or the reference is in doubt by too much.
+    """Stated over actual error; None where either is missing, the reference is in doubt by too much, or the verdict is
+    ``broken``: then there is no bound, whatever the parts add up to.
 
     Both are counted from `FLOOR` on, so that what is stated below it is enough for what is below it. Up to a stated
     horizon the error is stated to be within the tolerance, and beyond it nothing is relied on: that is what counts
@@ -67,7 +68,7 @@ def ratio(row: Row, part: str) -> float | None:
     """
     stated, actual = row.get("stated") or {}, (row.get("actual") or {}).get(part)
     error = judged(row, part)
-    if error is None or not actual:
+    if error is None or not actual or row.get("verdict") == "broken":
         return None
     doubts = (row.get("doubt") or {}).get("integration" if part == "integration" else "total")
     horizon = stated["horizon"]

@@ -59,7 +59,7 @@ def test_an_error_that_is_followed_in_fewer_steps_asks_for_no_run(monkeypatch: p
     run = erls.simulate(erls.load_scene(L_SHAPE, [*changes, "simulation.effects_tolerance=1"]), verdict=False)
     assert isinstance(run, ChainRun)
     assert run.solution.work.rhs_calls > 2000
-    monkeypatch.setattr(left_out_effects, "_from_a_run", None)
+    monkeypatch.setattr(left_out_effects, "error_beside", None)
     stated, _ = effects_error(run)
     free_fall = 0.5 * 9.81 * 0.02**2
     assert stated is not None
