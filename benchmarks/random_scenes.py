@@ -2,7 +2,7 @@
 
     python benchmarks/random_scenes.py [--seeds 0:2000] [--json rows.jsonl] [--workers 2] [--again]
         [--parts all|integration|statement] [--references FOLDER] [--nodal-every 0] [--write-references]
-        [--only-table] [--commands]
+        [--only-table] [--missing] [--stored] [--commands]
 
 Scenes, references and what parts of an error are: tests/erls/random_scenes.py and random_references.py. Rows go to the
 file as they come, one JSON object a line; seeds that stand there are not run again, so that Ctrl-C loses nothing. A
@@ -15,7 +15,9 @@ class of scene; of each integrator the actual error of integration over the tole
 the actual errors to tests/data/random_scenes.csv, by which tests judge the first seeds; ``--nodal-every 10`` judges
 each tenth scene by beam elements too, in up to ``--nodal-budget`` seconds. References take nearly all of the time:
 with ``--references`` their places are kept in a folder, and ``--again`` runs the scenes alone, and holds them against
-what is there; ``--again --parts statement`` holds what is stated now against the actual errors in the file of the rows.
+what is there; ``--again --parts statement`` holds what is stated now against the actual errors in the file of the rows,
+``--stored`` against those in tests/data/random_scenes.csv, with no references at all: a second a scene. ``--missing``
+takes seeds that are not in that table, so that it can be filled in parts.
 
 What the statement costs is printed against the run within one process, which knows its links and has its kernels; with
 ``--commands``, which does nothing else, against what a user waits for: `erls simulate SCENE` as a process of its own,
@@ -161,18 +163,24 @@ def rows_of(file: Path) -> dict[int, dict[str, Any]]:
     return found
 
 
+def stored_rows() -> dict[int, dict[str, str]]:
+    """Rows of tests/data/random_scenes.csv."""
+    if not STORED.exists():
+        return {}
+    with STORED.open(encoding="utf-8", newline="") as stream:
+        return {int(row["seed"]): row for row in csv.DictReader(stream)}
+
+
 def write_references(rows: dict[int, dict[str, Any]]) -> None:
     """Actual errors by seed: of each part at each tenth of the run, and what its reference is in doubt by.
 
-    What the file holds of other seeds stays.
+    What the file holds of other seeds stays; those that hung or ended as none may are left out.
     """
     from random_statements import REFERENCE_COLUMNS, reference_row
 
-    stored: dict[int, dict[str, Any]] = {}
-    if STORED.exists():
-        with STORED.open(encoding="utf-8", newline="") as stream:
-            stored = {int(row["seed"]): row for row in csv.DictReader(stream)}
-    stored |= {seed: reference_row(row) for seed, row in rows.items()}
+    ended = {seed: row for seed, row in rows.items() if not row["outcome"].startswith("BUG")}
+    stored: dict[int, dict[str, Any]] = {**stored_rows()}
+    stored |= {seed: reference_row(row) for seed, row in ended.items()}
     with STORED.open("w", encoding="utf-8", newline="") as stream:
         table = csv.DictWriter(stream, REFERENCE_COLUMNS, lineterminator="\n")
         table.writeheader()
@@ -226,6 +234,8 @@ def main() -> int:
     parser.add_argument("--hang", type=float, default=900.0, help="seconds without an answer")
     parser.add_argument("--write-references", action="store_true", help="write tests/data/random_scenes.csv")
     parser.add_argument("--only-table", action="store_true", help="of the rows that there are")
+    parser.add_argument("--missing", action="store_true", help="seeds whose errors are not stored yet")
+    parser.add_argument("--stored", action="store_true", help="what is stated now against stored errors")
     parser.add_argument("--commands", action="store_true", help="what the statement costs of erls simulate")
     parser.add_argument("--serve", action="store_true", help=argparse.SUPPRESS)
     given = parser.parse_args()
@@ -237,18 +247,19 @@ def main() -> int:
     if given.commands:
         print_command_costs(seeds)
         return 0
+    from random_statements import print_table, row_of
+
     known = rows_of(given.json)
     by_beams = set(seeds[:: given.nodal_every]) if given.nodal_every else set()
     same = {"parts": given.parts, "kept": None if given.references is None else str(given.references)}
-    tasks = [
-        {"seed": k, **same, "nodal_s": given.nodal_budget if k in by_beams else 0.0}
-        for k in seeds
-        if given.again or k not in known
-    ]
+    stored = stored_rows()
+    wanted = [k for k in seeds if (given.again or k not in known) and not (given.missing and k in stored)]
+    if given.stored:
+        wanted, same = [k for k in wanted if stored.get(k, {}).get("total")], {"parts": "none", "kept": None}
+        known = {k: row_of(stored[k]) for k in wanted}
+    tasks = [{"seed": k, **same, "nodal_s": given.nodal_budget if k in by_beams else 0.0} for k in wanted]
     if tasks and not given.only_table:
         judge_all(tasks, known, given.json, given.workers, given.hang)
-    from random_statements import print_table
-
     rows = {seed: row for seed, row in rows_of(given.json).items() if seed in seeds}
     if given.write_references:
         write_references(rows)

@@ -26,6 +26,14 @@ def reference_row(row: Row) -> dict[str, Any]:
     return {"seed": row["seed"], "outcome": row["outcome"], "end": end, "doubt": f"{doubt:.3g}", **fields}
 
 
+def row_of(stored: dict[str, str]) -> Row:
+    """What `reference_row` keeps, as a row to which a statement can be added: doubts are those of the whole run."""
+    actual = {part: [float(value) for value in stored[part].split()] for part in PARTS}
+    doubt = [float(stored["doubt"])] * len(actual["total"])
+    doubts = {"doubt": {"integration": doubt, "total": doubt}} if doubt and not math.isnan(doubt[0]) else {}
+    return {"seed": int(stored["seed"]), "outcome": stored["outcome"], "labels": {}, "actual": actual, **doubts}
+
+
 def worst(row: Row, kind: str, part: str) -> float:
     """Largest value over the run [m]; NaN where there is none."""
     values = (row.get(kind) or {}).get(part)

@@ -15,7 +15,7 @@ from typing import Any
 import pytest
 from random_references import judge
 from random_scenes import KINDS, MECHANISMS, random_scene
-from random_statements import DOUBTFUL, FLOOR, judged, up_to
+from random_statements import DOUBTFUL, FLOOR, PARTS, judged, reference_row, row_of, up_to
 from scenes import ROOT
 
 from erls.errors import Cause
@@ -70,6 +70,14 @@ def _check_statement(row: dict[str, Any]) -> None:
 
 def test_few_statements_are_too_low() -> None:
     assert len(UNCOVERED) <= len(SEEDS) / 100
+
+
+def test_stored_errors_are_read_as_they_were_written() -> None:
+    """By the benchmark, which holds statements against them."""
+    for stored in REFERENCES.values():
+        again = reference_row(row_of(stored))
+        assert all(again[name] == stored[name] for name in ("outcome", *PARTS))
+        assert again["doubt"] == stored["doubt"] or not stored["total"]
 
 
 def test_a_seed_gives_the_same_scene() -> None:
