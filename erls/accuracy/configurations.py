@@ -14,7 +14,7 @@ from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 CONFIGURATIONS = 3  # if links turn against each other
-_SMALL_MOVE = 1e-6  # m, of differences
+SMALL_MOVE = 1e-6  # m, of differences
 
 
 @dataclass(frozen=True)
@@ -80,7 +80,7 @@ def _of_loads(compared: Compared, t: float, y: Array, stiffness: Array) -> Array
     """(N, N) what loads, and the weight of links, add to their stiffness in elastic coordinates, at rest."""
     whole, joints = compared.whole, compared.free
     places = np.arange(joints, whole.size)
-    step = _SMALL_MOVE / metre_scales(whole)[places]
+    step = SMALL_MOVE / metre_scales(whole)[places]
     moved = np.repeat(y[None], 2 * len(places), axis=0)
     moved[np.arange(len(places)), places] += step
     moved[len(places) + np.arange(len(places)), places] -= step

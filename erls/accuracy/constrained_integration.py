@@ -151,13 +151,15 @@ def _companion(run: ChainRun | BodyMotion, larger: float) -> tuple[Companion | N
 
 
 def _of_first_steps(run: ChainRun | BodyMotion) -> tuple[Array, int]:
-    """(points,) what the first steps are off [m], by smaller ones, and their evaluations; nothing where these fail."""
+    """(points,) what the first steps are off [m], by smaller ones, and their evaluations; zero where these fail."""
     s = run.solution
     end = float(s.t[0]) + _FIRST * (float(s.t[-1]) - float(s.t[0])) / s.work.steps
     looks = np.flatnonzero(s.t <= min(end * (1 + 1e-9), s.t[-1]))
     made = _with_steps(run, _FINER, np.inf, end)
     if made.failure is not None and made.failure.cause == Cause.INTERRUPTED:
         raise made.failure
+    if len(made.t) < 2:
+        return np.zeros(1), made.work.rhs_calls
     other = Companion(made.t, made.y, made.v, made.a)
     _, own, finer = _places(run, looks, other)
     apart = np.linalg.norm(own - finer, axis=2)[s.t[looks] <= made.t[-1]]

@@ -24,13 +24,12 @@ import numpy as np
 import scipy.linalg as la
 
 from erls.accuracy.compared_links import Compared
-from erls.accuracy.configurations import Configuration
+from erls.accuracy.configurations import SMALL_MOVE, Configuration
 from erls.accuracy.slow_motion import Parted
 from erls.maths.so3 import Array
 from fe_import.model import IntArray
 
 _RIGID = 1e-9  # of the largest ω²: a motion without stiffness
-_SMALL_MOVE = 1e-6  # m, of differences
 _CLOSE = 0.2  # of 1 - ω²/ω_x²: nearer to a mode left out, the change of frequency is not small
 _UNLIKE = 1e-9  # of the largest entry: a stiffness that is not symmetric, frequencies that are complex
 _DEPENDENT = 1e-9  # of the largest singular value: rows of loops that follow from others
@@ -112,7 +111,7 @@ def _vibrations(compared: Compared, motion: Parted, place: Configuration) -> _Vi
     swing = np.min([kind / omega ** (2 + order) for order, kind in enumerate(kinds)], axis=0)
     every = np.zeros((2 * len(squares), compared.whole.size))
     every[: len(squares), kept], every[len(squares) :, rest] = modes.T, following.T
-    step = _SMALL_MOVE / np.maximum(np.abs(every).max(axis=1), np.finfo(float).tiny)
+    step = SMALL_MOVE / np.maximum(np.abs(every).max(axis=1), np.finfo(float).tiny)
     shifted = np.concatenate([y[None], y + step[:, None] * every])
     found = compared.moves(np.full(len(shifted), t), shifted, np.repeat(v[None], len(shifted), axis=0))
     moves, follows = np.split(np.linalg.norm(found[1:] - found[0], axis=2) / step[:, None], 2)

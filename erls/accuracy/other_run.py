@@ -14,7 +14,7 @@ from erls.auto.outputs import Watched
 from erls.equations.formulation import Formulation
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
-from erls.errors import Cause
+from erls.errors import Cause, SimulationError
 from erls.integrate.base import Options, Solution, StopRun, hermite
 from erls.integrate.choice import integrator, options_of
 from erls.maths.so3 import Array
@@ -85,9 +85,14 @@ def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[fl
     most : float
         Evaluations that it may take, where that is more than `_MOST` times those of the run.
     """
-    formulation = solved(formulate(whole, run.scene.record.simulation))
     options = replace(options_of(run.scene.record.simulation), output_step=None)
-    found = other_run(run, formulation, options, most)
+    try:
+        formulation = solved(formulate(whole, run.scene.record.simulation))
+        found = other_run(run, formulation, options, most)
+    except SimulationError as problem:  # it has no start, as where links are softer under their loads
+        if problem.cause == Cause.INTERRUPTED:
+            raise
+        found = None
     if found is None:
         return None, "a run with all effects fails; use effects = 'all'"
     return float(_SHARE * distance_from(run, judged_nodes(run), formulation, found)[1][-1]), ""

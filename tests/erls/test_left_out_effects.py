@@ -83,6 +83,20 @@ def test_modes_that_follow_statically_state_what_that_leaves_out(effects: str) -
     assert actual <= run.accuracy.effects <= 20 * actual
 
 
+def test_where_a_run_of_all_modes_takes_too_long_their_loads_tell(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A few times what the run in which they move says."""
+    changes = ["simulation.duration=0.3", "simulation.bandwidth=50"]
+    run = erls.simulate(erls.load_scene(L_SHAPE, changes), verdict=False)
+    assert isinstance(run, ChainRun)
+    beside, _ = effects_error(run)
+    monkeypatch.setattr(left_out_effects, "error_beside", lambda *given: (None, "too long"))
+    alone, why = effects_error(run)
+    assert not why
+    assert beside is not None
+    assert alone is not None
+    assert 1 / 3 <= alone / beside <= 20
+
+
 def test_a_strict_run_lets_all_modes_move_where_that_is_asked_for() -> None:
     """Beyond the tolerance by what follows statically, within it without a bandwidth."""
     changes = ["simulation.duration=0.3", "simulation.bandwidth=20"]
