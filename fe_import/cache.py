@@ -104,7 +104,8 @@ def left_out_cached(
     """
     source = modal.provenance.get("sha256", "")
     frequencies = hashlib.sha256(modal.frequencies_hz.tobytes()).hexdigest()
-    content = f"{source} {modal.modes} {frequencies} {sorted(loaded)} {_sources_hash()}"
+    warm = modal.thermal is not None and bool(modal.thermal.change)
+    content = f"{source} {modal.modes} {frequencies} {sorted(loaded)} {warm} {_sources_hash()}"
     key = hashlib.sha256(f"{left_out_file.SCHEMA_VERSION} {content}".encode()).hexdigest()[:32]
     if key in _lately:
         return _lately[key]

@@ -42,6 +42,7 @@ def joint_drift(
     borne: Array,
     ways: Sequence[Array] | None,
     sudden: bool = False,
+    more: Array | float = 0.0,
 ) -> Array:
     """(k, f) e of free joints [rad or m].
 
@@ -59,11 +60,13 @@ def joint_drift(
         Of `ways_of_joints`.
     sudden : bool
         Whether friction or limits of motors act.
+    more : (k, f) array or float
+        Forces R beside those (`erls.accuracy.mean_vibration_forces`).
     """
     free, (y, v, a) = compared.free, motion.whole
     bending = np.gradient(answer, motion.t, axis=0)
     states = y + answer, v + bending, a + np.gradient(bending, motion.t, axis=0)
-    forces = found.joints - _on_joints(compared, found.multipliers, motion.t, *states) - found.finer
+    forces = found.joints - _on_joints(compared, found.multipliers, motion.t, *states) - found.finer - more
     vectors = compared.whole.mechanism.rotation_vector_places
     masses = compared.lesser_masses(motion.t, y[:, compared.run])[:, :free, :free]
 

@@ -62,11 +62,10 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
         return None, "no states to judge"
     duration = run.end - float(run.solution.t[0])
     places = configurations(compared, motion)
-    start = motion.start if run.formulation.mechanism.static_start else None
-    jumps = sudden(run)
-    static, drift = slow_answer(compared, motion.slow, places, duration, start, jumps)
-    if compared.tied is not None and start is not None:
-        static = static + start_of_loops(compared, start)
+    at_rest, jumps = run.formulation.mechanism.static_start, sudden(run)
+    static, drift = slow_answer(compared, motion, places, duration, at_rest, jumps)
+    if compared.tied is not None and at_rest:
+        static = static + start_of_loops(compared, motion.start)
     off, follows = left_out_vibrations(compared, motion, places, duration)
     parts = static + _SUDDEN * follows + off + drift
     margin = _MARGIN_SUDDEN if jumps else _MARGIN

@@ -14,6 +14,8 @@ import numpy as np
 from erls.accuracy.compared_links import Compared, Motion
 from erls.accuracy.configurations import Configuration
 from erls.accuracy.joint_drift import joint_drift, ways_of_joints
+from erls.accuracy.mean_vibration_forces import mean_vibration_forces
+from erls.accuracy.slow_motion import Parted
 from erls.accuracy.unbalanced_forces import Unbalanced, unbalanced
 from erls.equations.loops.closed_chain import ClosedChain
 from erls.equations.series import mass_series
@@ -25,10 +27,10 @@ _PENALTY = 1e8  # of opened loops against stiffness
 
 def slow_answer(
     compared: Compared,
-    motion: Motion,
+    parts: Parted,
     places: Sequence[Configuration],
     duration: float,
-    start: Motion | None,
+    at_rest: bool,
     sudden: bool = False,
 ) -> tuple[Array, Array]:
     """(p,) largest displacement of each point by the answer to slow loads, and by the drift of free joints [m].
@@ -39,16 +41,17 @@ def slow_answer(
     Parameters
     ----------
     compared : Compared
-    motion : Motion
-        The slow one.
+    parts : Parted
+        Of the motion.
     places : sequence of Configuration
     duration : float
         Of the run [s].
-    start : Motion or None
-        State at the start of a run whose links are deformed as they bear it at rest; None where they start undeformed.
+    at_rest : bool
+        Whether links are deformed at the start as they bear it at rest; else they start undeformed.
     sudden : bool
         Whether friction or limits of motors act.
     """
+    motion, start = parts.slow, parts.start
     found, ways = unbalanced(compared, motion), ways_of_joints(compared, motion)
     free, whole = compared.free, compared.whole
     stiffness = np.concatenate([link.stiffness for link in whole.mechanism.links])
@@ -57,7 +60,7 @@ def slow_answer(
     borne: Array = np.zeros((1, whole.size))
     if ways is None:
         answer[:, free:] = -found.forces[:, free:] / stiffness
-        if start is not None:
+        if at_rest:
             borne[:, free:] = -unbalanced(compared, start).forces[:, free:] / stiffness
         largest = 2 * answer - borne
         for at, place in _nearest(motion.t, places):
@@ -70,7 +73,9 @@ def slow_answer(
         answer = _answer_of_loops(compared, motion, duration, found, ways)
         largest = 2 * answer
     if free and len(motion.t) > 1:
-        drift[:, :free] = joint_drift(compared, motion, found, answer, borne[0], ways, sudden)
+        swung = ways is None and not at_rest
+        more = mean_vibration_forces(compared, start, motion.t) if swung else 0.0
+        drift[:, :free] = joint_drift(compared, motion, found, answer, borne[0], ways, sudden, more)
     times = np.tile(motion.t, 3)
     still, bent, drifted = np.split(
         compared.moves(times, np.concatenate([y, y + largest, y + drift]), np.tile(v, (3, 1))), 3

@@ -32,6 +32,8 @@ class LeftOut:
         Displacement of each node of the modal model per unit coordinate [1/√kg].
     rotation_shapes : (k, 3, x) array
         Rotation of its ``rotation_nodes`` [rad/(m √kg)].
+    thermal : (x,) array
+        Generalized force of thermal expansion per kelvin; zero unless the link's temperature changes.
     invariants : InertiaInvariants
         Of the modes and the fields, m + x coordinates, from the mass matrix of the finer model.
     refined : bool
@@ -41,6 +43,7 @@ class LeftOut:
     stiffness: Array
     translation_shapes: Array
     rotation_shapes: Array
+    thermal: Array
     invariants: InertiaInvariants
     refined: bool
 
@@ -80,7 +83,7 @@ def extended(model: ModalModel, left: LeftOut, nodes: IntArray) -> ModalModel:
         residuals=np.concatenate([model.residuals, none]),
         recovery=None,
         second_order=None if model.second_order is None else _padded(model, model.second_order, count, nodes),
-        thermal=None if thermal is None else replace(thermal, force=np.concatenate([thermal.force, none])),
+        thermal=None if thermal is None else replace(thermal, force=np.concatenate([thermal.force, left.thermal])),
     )
 
 

@@ -14,7 +14,7 @@ from fe_import.modal.left_out import LeftOut
 from fe_import.modal.model import ModalModel
 
 SCHEMA = "erls fields left out"
-SCHEMA_VERSION = 1
+SCHEMA_VERSION = 2
 
 
 def write_left_out_file(path: Path, left: LeftOut) -> None:
@@ -36,6 +36,7 @@ def _write(group: h5py.Group, left: LeftOut) -> None:
         ("stiffness", left.stiffness, "1/s^2", "squared frequencies of the fields by themselves"),
         ("translation", left.translation_shapes, "m", "displacements; node, axis, field"),
         ("rotation", left.rotation_shapes, "rad", "rotations; rotation node, axis, field"),
+        ("thermal", left.thermal, "modal force per K", "generalized force of thermal expansion; field"),
         ("inertia/m", inertia.m, both, "mass matrix of modes and fields"),
         ("inertia/X", inertia.X, both, "U' M A_a U; axis a"),
         ("inertia/Z", inertia.Z, both, "U' A_a' M A_b U; axis a, axis b"),
@@ -65,6 +66,7 @@ def _read(file: Reader, model: ModalModel) -> LeftOut:
         stiffness=stiffness,
         translation_shapes=file.array("translation", (len(model.nodes), 3, count)),
         rotation_shapes=file.array("rotation", (len(model.rotation_nodes), 3, count)),
+        thermal=file.array("thermal", (count,)),
         invariants=InertiaInvariants(
             m=file.array("inertia/m", (size, size)),
             X=file.array("inertia/X", (3, size, size)),

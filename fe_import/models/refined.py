@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from fe_import.description.link import LinkFile
-from fe_import.elements.frame import FrameElement, assemble_frame
+from fe_import.elements.frame import FrameElement, assemble_frame, thermal_load
 from fe_import.model import Array, FEModel
 from fe_import.models.frame import frame_mesh, frame_model
 from fe_import.models.model import add_masses, to_si
@@ -47,7 +47,7 @@ def refined_frame(link: LinkFile, parts: int) -> FEModel:
         mass=frame.mass,
         rotary_inertia=frame.rotary_inertia,
     )
-    dofs = np.arange(6 * len(nodes), dtype=np.int64)
+    dofs, change = np.arange(6 * len(nodes), dtype=np.int64), description.temperature_change
     model = replace(
         frame_model(description, frame, where),
         nodes=nodes,
@@ -59,7 +59,7 @@ def refined_frame(link: LinkFile, parts: int) -> FEModel:
         stiffness_parts={},
         stress=None,
         beams=None,
-        thermal=None,
+        thermal=None if change is None else thermal_load(len(nodes), elements, change),
     )
     return to_si(add_masses(model, description.masses, where), description, where)
 

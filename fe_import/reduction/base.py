@@ -78,6 +78,11 @@ def expanded(model: FEModel, fields: Array) -> Array:
     return fields if model.coupling is None else np.asarray(model.coupling @ fields)
 
 
+def gathered(model: FEModel, loads: Array) -> Array:
+    """(f, k) loads on the independent dofs that do the same work as loads (d, k) on all nodal components."""
+    return loads if model.coupling is None else np.asarray(model.coupling.T @ loads)
+
+
 def interface_places(model: FEModel) -> IntArray:
     """(6 n_interfaces,) positions of the interface dofs among the independent dofs."""
     place = np.full(model.mass.shape[0], -1)

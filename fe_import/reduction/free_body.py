@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_import.model import Array, FEModel, IntArray
-from fe_import.reduction.base import expanded, interface_places
+from fe_import.reduction.base import expanded, gathered, interface_places
 from fe_import.reduction.rigid_modes import rigid_modes
 from fe_import.solver.sparse import Factorization, factorize, lowest_modes, modes_below
 
@@ -201,5 +201,4 @@ def inertia_relief(model: FEModel, loads: Array) -> Array:
     (d, k) array
         Pᵀ K⁺ P of the loads, P = 1 - M R Rᵀ; no mode of the link is left out.
     """
-    forces = loads if model.coupling is None else np.asarray(model.coupling.T @ loads)
-    return expanded(model, free_body(model, model.source).static(forces))
+    return expanded(model, free_body(model, model.source).static(gathered(model, loads)))

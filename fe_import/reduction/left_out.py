@@ -1,11 +1,11 @@
 """What a reduced link leaves out of its finite-element model: the static answers to its loads that it lacks.
 
 A link in motion bears loads of joints and payloads on some nodes, the inertia of its rigid-body motion, centrifugal
-forces ρ S x of its turning, and the inertia M Φ q̈ of the modes kept. With f one of them, balanced by the inertia of the
-rigid-body acceleration that it causes, the full model answers by u = K⁺ f (`fe_import.reduction.free_body`) and the
-modes kept by Φ Ω⁻² Φᵀ f; the difference is what is left out, up to the square of the ratio of the frequencies. The
-fields that these differences span, the largest first, are the beginning of a Krylov space (moment matching): the first
-change of every frequency by what is left out is exact in them.
+forces ρ S x of its turning, the inertia M Φ q̈ of the modes kept, and what a change of temperature does to it. With f
+one of them, balanced by the inertia of the rigid-body acceleration that it causes, the full model answers by u = K⁺ f
+(`fe_import.reduction.free_body`) and the modes kept by Φ Ω⁻² Φᵀ f; the difference is what is left out, up to the square
+of the ratio of the frequencies. The fields that these differences span, the largest first, are the beginning of a
+Krylov space (moment matching): the first change of every frequency by what is left out is exact in them.
 
 Each load is measured by the strain energy that it causes, loads of a mode of frequency ω also by ω₁ / ω, since slow
 ones move it by ω⁻². Fields below `NEGLIGIBLE` of that are dropped, and the smallest of too many.
@@ -27,7 +27,7 @@ from fe_import.modal.model import ModalModel
 from fe_import.model import Array, FEModel
 from fe_import.models.model import build_model
 from fe_import.models.refined import on_refined, refined_frame
-from fe_import.reduction.base import expanded
+from fe_import.reduction.base import expanded, gathered
 from fe_import.reduction.free_body import FreeBody, free_body
 
 NEGLIGIBLE = 1e-2  # of the root of the strain energy of a load: 1e-4 of its flexibility
@@ -66,7 +66,9 @@ def left_out(
     shapes = on_refined(model, _nodal_fields(model, modal))
     body = free_body(model, model.source)
     elastic = shapes[model.independent][:, 6:]
+    expansion = _expansion(model, modal)
     loads, weights = _loads(model, body, elastic, modal, loaded)
+    loads, weights = np.hstack([loads, expansion]), [*weights, np.ones(expansion.shape[1])]
     answers = body.static(loads)
     scale = _scale(np.einsum("fb,fb->b", body.balanced(loads), answers), weights)
     missing = _less(body, elastic, answers)
@@ -80,6 +82,7 @@ def left_out(
         stiffness=squares,
         translation_shapes=np.ascontiguousarray(extra[model.dof_map[:nodes, :3]]),
         rotation_shapes=np.ascontiguousarray(extra[model.dof_map[turning, 3:]]),
+        thermal=(fields.T @ expansion).sum(axis=1),
         invariants=inertia_invariants(model.mass, np.hstack([shapes, extra]), model.dof_map, rigid),
         refined=refined,
     )
@@ -131,6 +134,13 @@ def _loads(
     omega = np.sqrt(np.diag(modal.stiffness)[6:])
     weights = [np.ones(len(rows)), np.ones(6), omega.min(initial=np.inf) / omega]
     return np.hstack([units, spin, body.mass @ elastic]), weights
+
+
+def _expansion(model: FEModel, modal: ModalModel) -> Array:
+    """(f, 1) load per kelvin on the independent dofs; (f, 0) without a change of temperature."""
+    if model.thermal is None or modal.thermal is None or not modal.thermal.change:
+        return np.zeros((len(model.independent), 0))
+    return gathered(model, model.thermal.force[:, None])
 
 
 def _scale(energy: Array, weights: list[Array]) -> Array:

@@ -193,6 +193,18 @@ def test_other_coordinates_state_the_same(tmp_path: Path, overrides: list[str]) 
     assert error / 2 < stated(run_of(scene, *overrides)) < 2 * error
 
 
+def test_a_link_that_cannot_expand_says_so(tmp_path: Path) -> None:
+    """Its three modes bend alone: it lacks α ΔT L of its long leg, about which it would swing."""
+    warm = {"materials": {"m": {"thermal_expansion": 1.2e-5}}, "temperature_change": 60.0}
+    scenes.l_link(tmp_path, 4, reduction={"method": "craig-bampton", "fixed_interface_modes": 6}, **warm)
+    scene = scenes.l_scene(tmp_path, simulation={"duration": 0.05})
+    run = run_of(scene, "links.l.elastic_modes=3")
+    actual = distance(run, run_of(scene, *finer(tmp_path, scene, 2)))
+    cold = run_of(scene, "links.l.elastic_modes=3", "links.l.temperature_change=0")
+    assert stated(cold) < actual / 2
+    assert actual <= stated(run) <= 5 * actual
+
+
 def test_pieces_and_slow_modes_are_judged(tmp_path: Path) -> None:
     scenes.l_link(tmp_path, 4, reduction={"method": "craig-bampton", "elastic_modes": 8})
     scene = scenes.l_scene(tmp_path, simulation={"duration": 0.05})

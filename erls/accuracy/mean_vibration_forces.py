@@ -1,0 +1,109 @@
+"""Mean forces of vibrations on joints, which a mechanism with finer links vibrates otherwise at the start than it did.
+
+A start at which loads come suddenly sets the modes of K ψ = ω² M ψ vibrating about their equilibrium, by A = |ψᵀR|/ω²
+with the forces R out of balance there. Forces that are not linear in displacements and rates, as those of inertia,
+friction and contacts, then have a mean over a period that drives slow joints,
+
+    F = 1/2π ∮ R_θ(y + A ψ cos φ, v - ω A ψ sin φ, -ω² A ψ cos φ) dφ - R_θ(y, v, 0),
+
+which dies out with the energy of the vibration, as exp(-2 ζ ω t). Modes have nothing to do with each other, so that
+their forces add up. What a run is off by is F of the finer links less F of those that it had. What is left out is
+damped as the least damped mode of the link that was kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import scipy.linalg as la
+
+from erls.accuracy.compared_links import Compared, Motion
+from erls.equations.formulation import TreeFormulation
+from erls.maths.so3 import Array
+
+_PHASES = 16  # of a period: odd forces as those of friction have no mean, and jump between two of them
+_ELASTIC = 0.5  # of the energy of a mode, in links: the rest are joints on their springs, which drift tells
+
+Forces = Callable[[Array, Array, Array, Array], Array]
+
+
+def mean_vibration_forces(compared: Compared, start: Motion, t: Array) -> Array:
+    """(k, f) what free joints lack of them at the times t (k,) of a run [N m or N]; of trees.
+
+    Parameters
+    ----------
+    compared : Compared
+    start : Motion
+        The first instant, without accelerations.
+    t : (k,) array
+        Middles of stretches of time, over which means are taken [s].
+    """
+    y, v = start.whole[0][0], start.whole[1][0]
+    at, run = float(start.t[0]), compared.run
+    edges = np.concatenate([[0.0], (t[1:] + t[:-1]) / 2 - at, t[-1:] - at])
+    whole = mean_forces(compared.whole, compared.forces, at, y, v, _damping_left_out(compared), edges)
+    none = np.zeros(compared.lesser.size)
+    lesser = mean_forces(compared.lesser, compared.lesser_forces, at, y[run], v[run], none, edges)
+    return whole - lesser
+
+
+def mean_forces(
+    equations: TreeFormulation, forces: Forces, t: float, y: Array, v: Array, more: Array, edges: Array
+) -> Array:
+    """Mean forces of the vibrations that a start sets off.
+
+    Parameters
+    ----------
+    equations : TreeFormulation
+        Of n coordinates, f of free joints before those of links.
+    forces : callable
+        (k, n) forces out of balance at k times and states.
+    t : float
+        Time of the start [s].
+    y, v : (n,) arrays
+        Its state.
+    more : (n,) array
+        Damping of coordinates beside that of the equations.
+    edges : (k + 1,) array
+        Of k stretches of time, from the start [s].
+
+    Returns
+    -------
+    (k, f) array
+        Means over each stretch.
+    """
+    mechanism, free = equations.mechanism, len(equations.free_joints)
+    stiffness, damping = equations.stiffness_and_damping(t, y, v)
+    squares, modes = la.eigh((stiffness + stiffness.T) / 2, equations.mass_matrix(t, y), check_finite=False)
+    of_links = np.concatenate([np.zeros(free), *(link.stiffness for link in mechanism.links)])
+    elastic = (squares > 0) & (of_links @ modes**2 > _ELASTIC * squares)
+    squares, modes = squares[elastic], modes[:, elastic]
+    decay = np.einsum("ij,ik,kj->j", modes, damping + np.diag(more), modes).clip(min=0.0)
+    still = forces(np.array([t]), y[None], v[None], 0 * y[None])[0]
+    swing = (np.abs(still @ modes) / squares * modes).T
+
+    phases = 2 * np.pi * (np.arange(_PHASES) + 0.5) / _PHASES
+    there, along = (part[:, None, None] * swing for part in (np.cos(phases), np.sin(phases)))
+    omega = np.sqrt(squares)[:, None]
+    states = y + there, v - omega * along, -(omega**2) * there
+    found = forces(np.full(_PHASES * len(swing), t), *(part.reshape(-1, len(y)) for part in states))
+    mean = found.reshape(_PHASES, len(swing), len(y)).mean(axis=0) - still
+    return np.asarray(_mean_decay(np.outer(edges, decay)) @ mean[:, :free])
+
+
+def _mean_decay(x: Array) -> Array:
+    """(k, j) means of exp(-x) between one row of x (k + 1, j) and the next."""
+    span = np.diff(x, axis=0)
+    return np.asarray(np.exp(-x[:-1]) * np.where(span > 0, -np.expm1(-span) / np.where(span > 0, span, 1.0), 1.0))
+
+
+def _damping_left_out(compared: Compared) -> Array:
+    """(N,) of the coordinates that are left out."""
+    result = [np.zeros(compared.free)]
+    for own, finer in zip(compared.lesser.mechanism.links, compared.whole.mechanism.links, strict=True):
+        kept = own.elastic_modes
+        ratio = (own.damping / (2 * np.sqrt(own.stiffness))).min(initial=np.inf)
+        rest = 2 * ratio * np.sqrt(finer.stiffness[kept:]) if kept else np.zeros(finer.elastic_modes)
+        result += [np.zeros(kept), rest]
+    return np.concatenate(result)
