@@ -22,13 +22,14 @@ from erls.accuracy.compared_links import Compared, Motion
 from erls.equations.formulation import TreeFormulation
 from erls.maths.so3 import Array
 
-_PHASES = 16  # of a period: odd forces as those of friction have no mean, and jump between two of them
+_PHASES, _PHASES_SUDDEN = 8, 32  # of a period: exact for squares of vibrations; where friction and limits jump
+_SMALL = 1e-3  # of the largest energy of a mode: forces are about proportional to it
 _ELASTIC = 0.5  # of the energy of a mode, in links: the rest are joints on their springs, which drift tells
 
 Forces = Callable[[Array, Array, Array, Array], Array]
 
 
-def mean_vibration_forces(compared: Compared, start: Motion, t: Array) -> Array:
+def mean_vibration_forces(compared: Compared, start: Motion, t: Array, sudden: bool) -> Array:
     """(k, f) what free joints lack of them at the times t (k,) of a run [N m or N]; of trees.
 
     Parameters
@@ -38,18 +39,28 @@ def mean_vibration_forces(compared: Compared, start: Motion, t: Array) -> Array:
         The first instant, without accelerations.
     t : (k,) array
         Middles of stretches of time, over which means are taken [s].
+    sudden : bool
+        Whether friction or limits of motors act.
     """
     y, v = start.whole[0][0], start.whole[1][0]
     at, run = float(start.t[0]), compared.run
     edges = np.concatenate([[0.0], (t[1:] + t[:-1]) / 2 - at, t[-1:] - at])
-    whole = mean_forces(compared.whole, compared.forces, at, y, v, _damping_left_out(compared), edges)
+    phases = _PHASES_SUDDEN if sudden else _PHASES
+    whole = mean_forces(compared.whole, compared.forces, at, y, v, _damping_left_out(compared), edges, phases)
     none = np.zeros(compared.lesser.size)
-    lesser = mean_forces(compared.lesser, compared.lesser_forces, at, y[run], v[run], none, edges)
+    lesser = mean_forces(compared.lesser, compared.lesser_forces, at, y[run], v[run], none, edges, phases)
     return whole - lesser
 
 
 def mean_forces(
-    equations: TreeFormulation, forces: Forces, t: float, y: Array, v: Array, more: Array, edges: Array
+    equations: TreeFormulation,
+    forces: Forces,
+    t: float,
+    y: Array,
+    v: Array,
+    more: Array,
+    edges: Array,
+    phases: int = _PHASES,
 ) -> Array:
     """Mean forces of the vibrations that a start sets off.
 
@@ -67,6 +78,8 @@ def mean_forces(
         Damping of coordinates beside that of the equations.
     edges : (k + 1,) array
         Of k stretches of time, from the start [s].
+    phases : int
+        Of a period, at which forces are evaluated.
 
     Returns
     -------
@@ -81,14 +94,17 @@ def mean_forces(
     squares, modes = squares[elastic], modes[:, elastic]
     decay = np.einsum("ij,ik,kj->j", modes, damping + np.diag(more), modes).clip(min=0.0)
     still = forces(np.array([t]), y[None], v[None], 0 * y[None])[0]
+    energy = (still @ modes) ** 2 / squares
+    most = energy > _SMALL * energy.max(initial=0.0)
+    squares, modes, decay = squares[most], modes[:, most], decay[most]
     swing = (np.abs(still @ modes) / squares * modes).T
 
-    phases = 2 * np.pi * (np.arange(_PHASES) + 0.5) / _PHASES
-    there, along = (part[:, None, None] * swing for part in (np.cos(phases), np.sin(phases)))
+    angles = 2 * np.pi * (np.arange(phases) + 0.5) / phases
+    there, along = (part[:, None, None] * swing for part in (np.cos(angles), np.sin(angles)))
     omega = np.sqrt(squares)[:, None]
     states = y + there, v - omega * along, -(omega**2) * there
-    found = forces(np.full(_PHASES * len(swing), t), *(part.reshape(-1, len(y)) for part in states))
-    mean = found.reshape(_PHASES, len(swing), len(y)).mean(axis=0) - still
+    found = forces(np.full(phases * len(swing), t), *(part.reshape(-1, len(y)) for part in states))
+    mean = found.reshape(phases, len(swing), len(y)).mean(axis=0) - still
     return np.asarray(_mean_decay(np.outer(edges, decay)) @ mean[:, :free])
 
 

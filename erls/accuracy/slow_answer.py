@@ -74,7 +74,7 @@ def slow_answer(
         largest = 2 * answer
     if free and len(motion.t) > 1:
         swung = ways is None and not at_rest
-        more = mean_vibration_forces(compared, start, motion.t) if swung else 0.0
+        more = mean_vibration_forces(compared, start, motion.t, sudden) if swung else 0.0
         drift[:, :free] = joint_drift(compared, motion, found, answer, borne[0], ways, sudden, more)
     times = np.tile(motion.t, 3)
     still, bent, drifted = np.split(
