@@ -8,7 +8,9 @@ Beside the mechanism that was run stands one whose links hold what their reducti
 - Links are softer than they were taken to be: vibrations run out of step, which usually counts most.
 - Under slow loads they have another shape, which makes free joints drift.
 
-Their sum, largest over points, is stated with a margin: all three are of first order in what is left out.
+Vibrations and what follows loads have nothing to do with each other: their squares add up. Drift comes on top, of which
+errors of first order tell less, since joints that go astray bear other loads. All have a margin, by which 861 random
+scenes are stated right with 99 % of them at least (`benchmarks/random_scenes.py`).
 """
 
 from __future__ import annotations
@@ -27,8 +29,9 @@ from erls.equations.substructures import solved
 from erls.run.chain.run import ChainRun
 from fe_import.errors import FEImportError
 
-_SUDDEN = 2.0  # of what follows vibrations, where these come suddenly
-_MARGIN, _MARGIN_SUDDEN = 2.0, 2.5  # of the sum; where friction and limits of motors act, which errors set off
+_TWICE = 2.0  # of what follows vibrations, where these come suddenly
+_MARGIN, _MARGIN_DRIFT = 2.0, 3.0
+_MORE_SUDDEN = 1.25  # times as much where friction and limits of motors act, which errors set off
 
 
 def modes_error(run: ChainRun) -> tuple[float | None, str]:
@@ -67,7 +70,6 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
     if compared.tied is not None and at_rest:
         static = static + start_of_loops(compared, motion.start)
     off, follows = left_out_vibrations(compared, motion, places, duration)
-    parts = static + _SUDDEN * follows + off + drift
-    margin = _MARGIN_SUDDEN if jumps else _MARGIN
-    error = float(margin * parts.max(initial=0.0))
+    moved = _MARGIN * np.sqrt(static**2 + (_TWICE * follows) ** 2 + off**2) + _MARGIN_DRIFT * drift
+    error = float((_MORE_SUDDEN if jumps else 1.0) * moved.max(initial=0.0))
     return (error, "; ".join(finer.notes)) if np.isfinite(error) else (None, "motion without bound")
