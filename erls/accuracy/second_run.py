@@ -31,7 +31,7 @@ _OF_IMPACTS = 64.0
 
 _SHARE, _SHARE_SUDDEN = 1.2, 2.0  # of the distance; where friction and limits decide, or of a better run, which errs
 _FORCES = 8  # instants at which they are compared
-_LIKE = 0.95  # steps of a run at a larger tolerance, of those of the run: as many are the same ones
+LIKE = 0.95  # steps of a run at a larger tolerance, of those of the run: as many are the same ones
 
 
 def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
@@ -47,9 +47,9 @@ def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
     found, share = None, _SHARE_SUDDEN if sudden(run) else _SHARE
     mechanism = run.formulation.mechanism
     if not (mechanism.sticks or mechanism.touches):
-        found = _second(run, LARGER)
-    if found is None or found.work.steps > _LIKE * run.solution.work.steps:
-        better = _second(run, 1 / (_OF_IMPACTS if mechanism.touches else LARGER))
+        found = run_at(run, LARGER)
+    if found is None or found.work.steps > LIKE * run.solution.work.steps:
+        better = run_at(run, 1 / (_OF_IMPACTS if mechanism.touches else LARGER))
         found, share = (found, _SHARE) if better is None else (better, _SHARE_SUDDEN)
     if found is None:
         return None
@@ -65,8 +65,8 @@ def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
     return ErrorOverTime(looks, share * apart + ITERATED * aim, effort, reaction)
 
 
-def _second(run: ChainRun, times: float) -> Solution | None:
-    """A run at so many times the tolerance; None where it fails."""
+def run_at(run: ChainRun, times: float) -> Solution | None:
+    """A second run at so many times the tolerance; None where it fails."""
     given = options_of(run.scene.record.simulation)
     changed = replace(
         given,
