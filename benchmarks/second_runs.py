@@ -31,7 +31,7 @@ COVERED = 98  # percent
 
 def measured(seed: int, actual: float, times: list[float]) -> list[tuple[float, float]]:
     """Of each factor on the tolerance, evaluations of the second run in those of the first, and the actual error over
-    the distance; NaN where the second run fails, or takes the same steps. Nothing of scenes that a second run does not judge.
+    the distance; NaN where the second run fails, or takes the same steps. Nothing of scenes that it does not judge.
     """
     from random_references import limited_run
     from random_scenes import random_scene
