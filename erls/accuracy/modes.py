@@ -9,8 +9,8 @@ Beside the mechanism that was run stands one whose links hold what their reducti
 - Under slow loads they have another shape, which makes free joints drift.
 
 Vibrations and what follows loads have nothing to do with each other: their squares add up. Drift comes on top, of which
-errors of first order tell less, since joints that go astray bear other loads. All have a margin, by which 861 random
-scenes are stated right with 99 % of them at least (`benchmarks/random_scenes.py`).
+errors of first order tell less, since joints that go astray bear other loads. All have a margin
+(`benchmarks/random_scenes.py`).
 """
 
 from __future__ import annotations
