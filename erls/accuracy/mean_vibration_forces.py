@@ -6,9 +6,10 @@ friction and contacts, then have a mean over a period that drives slow joints,
 
     F = 1/2π ∮ R_θ(y + A ψ cos φ, v - ω A ψ sin φ, -ω² A ψ cos φ) dφ - R_θ(y, v, 0),
 
-which dies out with the energy of the vibration, as exp(-2 ζ ω t). Modes have nothing to do with each other, so that
-their forces add up. What a run is off by is F of the finer links less F of those that it had. What is left out is
-damped as the least damped mode of the link that was kept.
+which dies out with the energy of the vibration, as exp(-2 ζ ω t), and is otherwise taken to stay as at the start. Modes
+of unlike frequency have nothing to do with each other, so that their forces add up. What a run is off by is F of the
+finer links less F of those that it had. What is left out is damped as the least damped mode of the link that was kept.
+Links that are nothing but a modal file have no finer ones, and none of it.
 """
 
 from __future__ import annotations
@@ -38,7 +39,7 @@ def mean_vibration_forces(compared: Compared, start: Motion, t: Array, sudden: b
     start : Motion
         The first instant, without accelerations.
     t : (k,) array
-        Middles of stretches of time, over which means are taken [s].
+        Middles of stretches of time, two or more, over which means are taken [s]; impulses count from the start on.
     sudden : bool
         Whether friction or limits of motors act.
     """
@@ -49,7 +50,9 @@ def mean_vibration_forces(compared: Compared, start: Motion, t: Array, sudden: b
     whole = mean_forces(compared.whole, compared.forces, at, y, v, _damping_left_out(compared), edges, phases)
     none = np.zeros(compared.lesser.size)
     lesser = mean_forces(compared.lesser, compared.lesser_forces, at, y[run], v[run], none, edges, phases)
-    return whole - lesser
+    found = whole - lesser
+    found[0] *= edges[1] / ((t[1] - t[0]) / 2)  # the impulse since the start: drift is followed from t[0] on
+    return found
 
 
 def mean_forces(
@@ -75,7 +78,7 @@ def mean_forces(
     y, v : (n,) arrays
         Its state.
     more : (n,) array
-        Damping of coordinates beside that of the equations.
+        Damping of coordinates beside that of the equations [1/s].
     edges : (k + 1,) array
         Of k stretches of time, from the start [s].
     phases : int

@@ -6,11 +6,12 @@ Beside the mechanism that was run stands one whose links hold what their reducti
 - What is left out follows slow loads statically, and moves points (`slow_answer`); where loads come suddenly it
   vibrates, by as much again. Other loads are those of vibrations (`left_out_vibrations`).
 - Links are softer than they were taken to be: vibrations run out of step, which usually counts most.
-- Under slow loads they have another shape, which makes free joints drift.
+- Under slow loads they have another shape, and vibrations of a sudden start another mean force
+  (`mean_vibration_forces`), which makes free joints drift.
 
-Vibrations and what follows loads have nothing to do with each other: their squares add up. Drift comes on top, of which
-errors of first order tell less, since joints that go astray bear other loads. All have a margin
-(`benchmarks/random_scenes.py`).
+Vibrations, what follows them and what follows slow loads have nothing to do with each other: their squares add up.
+Drift comes on top, of which errors of first order tell less, since joints that go astray bear other loads. All have a
+margin (`benchmarks/random_scenes.py`).
 """
 
 from __future__ import annotations

@@ -283,8 +283,12 @@ def modes_below(
     try:
         return _count(stiffness, mass, shift, elimination)
     except OutsidePattern:  # masses that couple what no stiffness does
-        both = _canonical(abs(stiffness) + abs(mass))
-        return _count(stiffness, mass, shift, analyse(both, positions))
+        return _count(stiffness, mass, shift, analyse(_pattern(stiffness) + _pattern(mass), positions))
+
+
+def _pattern(matrix: sp.csc_array) -> sp.csc_array:
+    """Ones wherever an entry is stored: a zero among them would be lost in a sum."""
+    return sp.csc_array((np.ones(matrix.nnz), matrix.indices, matrix.indptr), shape=matrix.shape)
 
 
 def _count(stiffness: sp.csc_array, mass: sp.csc_array, shift: float, elimination: Elimination) -> int | None:

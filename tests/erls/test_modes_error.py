@@ -322,6 +322,17 @@ def test_drift_is_that_of_an_oscillator(stiffness: float, damping: float, loop: 
     assert np.abs(drift - exact[:, None]).max() < (0.06 if loop else 0.02) * np.abs(exact).max()
 
 
+def test_a_force_that_comes_beside_pushes_against_its_sign() -> None:
+    """A free joint of unit mass under a residual force of 2, from rest: e = -t²; Newmark's method is exact."""
+    t = np.linspace(0.0, 1.5, 61)
+    still = np.zeros((len(t), 2))
+    found = Unbalanced(still, still[:, :1], still[:, :1], np.zeros((len(t), 0, 2)), np.zeros((len(t), 0)))
+    motion = Motion(t, (still, still, still), (still, still, still))
+    more = np.full((len(t), 1), 2.0)
+    drift = joint_drift(one_way(0.0, 0.0, 0.0, None), motion, found, still, still[0], None, False, more)
+    assert drift[:, 0] == pytest.approx(-(t**2), rel=0, abs=1e-9)
+
+
 @pytest.mark.parametrize("carry", [0.0, 0.4])
 @pytest.mark.parametrize(("borne", "rate"), [(0.0, 0.0), (1.0, 0.0), (0.5, 2.0)])
 def test_links_that_are_stretched_take_momentum_from_joints(borne: float, rate: float, carry: float) -> None:

@@ -193,7 +193,10 @@ def test_masses_that_couple_what_no_stiffness_does() -> None:
     elimination = factorize(model.stiffness, "x").elimination
     with pytest.raises(OutsidePattern):
         multifrontal.negative_pivots(model.stiffness, elimination, silent, mass, shift)
-    assert modes_below(model.stiffness, mass, shift, elimination=elimination) == 10
+    stored = model.stiffness.copy()
+    stored.data[np.abs(stored.data) < 1e-9 * stored.data.max()] = 0.0  # as rounding may leave them, in the pattern yet
+    for stiffness in (model.stiffness, stored):
+        assert modes_below(stiffness, mass, shift, elimination=elimination) == 10
 
 
 # ----- modes
