@@ -85,6 +85,9 @@ def main() -> int:
             print(f"  seed {seed}: {problem.cause}", file=sys.stderr)
     for factor, pairs in found.items():
         known = np.array([pair for pair in pairs if np.isfinite(pair).all()])
+        if not len(known):
+            print(f"{factor:5g} times the tolerance: none of {len(pairs)} runs tells anything")
+            continue
         cost, share = known.T
         stated = np.percentile(share, COVERED)
         middle, high = np.percentile(share, (50, 90))

@@ -1,15 +1,16 @@
 """Mean forces of vibrations on joints, which a mechanism with finer links vibrates otherwise at the start than it did.
 
-A start at which loads come suddenly sets the modes of K ψ = ω² M ψ vibrating about their equilibrium, by A = |ψᵀR|/ω²
+A start at which loads come suddenly sets the modes of K ψ = ω² M ψ vibrating about their equilibrium, by A = ψᵀR/ω²
 with the forces R out of balance there. Forces that are not linear in displacements and rates, as those of inertia,
 friction and contacts, then have a mean over a period that drives slow joints,
 
     F = 1/2π ∮ R_θ(y + A ψ cos φ, v - ω A ψ sin φ, -ω² A ψ cos φ) dφ - R_θ(y, v, 0),
 
 which dies out with the energy of the vibration, as exp(-2 ζ ω t), and is otherwise taken to stay as at the start. Modes
-of unlike frequency have nothing to do with each other, so that their forces add up. What a run is off by is F of the
-finer links less F of those that it had. What is left out is damped as the least damped mode of the link that was kept.
-Links that are nothing but a modal file have no finer ones, and none of it.
+of unlike frequency have nothing to do with each other, so that their forces add up; those that stay in step to the end
+of the run swing as one, Σ A ψ, or what they are taken to be would follow from rounding. What a run is off by is F of
+the finer links less F of those that it had. What is left out is damped as the least damped mode of the link that was
+kept. Links that are nothing but a modal file have no finer ones, and none of it.
 """
 
 from __future__ import annotations
@@ -21,10 +22,12 @@ import scipy.linalg as la
 
 from erls.accuracy.compared_links import Compared, Motion
 from erls.equations.formulation import TreeFormulation
+from erls.equations.serial.equilibrium import elastic_on_diagonal
 from erls.maths.so3 import Array
 
 _PHASES, _PHASES_SUDDEN = 8, 32  # of a period: exact for squares of vibrations; where friction and limits jump
-_SMALL = 1e-3  # of the largest energy of a mode: forces are about proportional to it
+_SMALL = 1e-3  # of the largest energy of a vibration: forces are about proportional to it
+_IN_STEP = 1.0  # rad over the run, by which frequencies of one vibration may lie apart
 _ELASTIC = 0.5  # of the energy of a mode, in links: the rest are joints on their springs, which drift tells
 
 Forces = Callable[[Array, Array, Array, Array], Array]
@@ -89,23 +92,25 @@ def mean_forces(
     (k, f) array
         Means over each stretch.
     """
-    mechanism, free = equations.mechanism, len(equations.free_joints)
+    free = len(equations.free_joints)
     stiffness, damping = equations.stiffness_and_damping(t, y, v)
     squares, modes = la.eigh((stiffness + stiffness.T) / 2, equations.mass_matrix(t, y), check_finite=False)
-    of_links = np.concatenate([np.zeros(free), *(link.stiffness for link in mechanism.links)])
-    elastic = (squares > 0) & (of_links @ modes**2 > _ELASTIC * squares)
+    elastic = (squares > 0) & (elastic_on_diagonal(equations)[0] @ modes**2 > _ELASTIC * squares)
     squares, modes = squares[elastic], modes[:, elastic]
     decay = np.einsum("ij,ik,kj->j", modes, damping + np.diag(more), modes).clip(min=0.0)
     still = forces(np.array([t]), y[None], v[None], 0 * y[None])[0]
-    energy = (still @ modes) ** 2 / squares
+    omega, amplitude = np.sqrt(squares), still @ modes / squares
+    number = np.cumsum(np.diff(omega, prepend=omega[:1]) * edges[-1] > _IN_STEP)
+    together = (number == np.arange(len(omega))[:, None]).astype(float)  # (vibrations, modes)
+    energies = together * (omega * amplitude) ** 2
+    energy = energies.sum(axis=1)
     most = energy > _SMALL * energy.max(initial=0.0)
-    squares, modes, decay = squares[most], modes[:, most], decay[most]
-    swing = (np.abs(still @ modes) / squares * modes).T
+    together, decay = together[most], energies[most] @ decay / energy[most]
+    swing, rate, acceleration = (together @ (amplitude * omega**order * modes).T for order in range(3))
 
     angles = 2 * np.pi * (np.arange(phases) + 0.5) / phases
-    there, along = (part[:, None, None] * swing for part in (np.cos(angles), np.sin(angles)))
-    omega = np.sqrt(squares)[:, None]
-    states = y + there, v - omega * along, -(omega**2) * there
+    cosine, sine = np.cos(angles)[:, None, None], np.sin(angles)[:, None, None]
+    states = y + cosine * swing, v - sine * rate, -cosine * acceleration
     found = forces(np.full(phases * len(swing), t), *(part.reshape(-1, len(y)) for part in states))
     mean = found.reshape(phases, len(swing), len(y)).mean(axis=0) - still
     return np.asarray(_mean_decay(np.outer(edges, decay)) @ mean[:, :free])

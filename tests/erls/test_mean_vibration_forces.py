@@ -23,6 +23,13 @@ SUPPORT, BOB, LENGTH, STIFFNESS, LOAD = 3.0, 0.2, 0.5, 4e6, 40.0
 """kg, kg, m, N/m, N: a point on a spring along y, which a load pulls from the start on, and a pendulum on it."""
 
 
+def springs(count: int) -> Any:
+    """Links that are nothing but a spring each."""
+    model = SimpleNamespace(thermal=None)
+    link = SimpleNamespace(stiffness=np.array([STIFFNESS]), elastic_modes=1, model=model)
+    return SimpleNamespace(links=[link] * count)
+
+
 def on_a_spring(angle: float, damping: float = 0.0) -> tuple[Any, Any]:
     """Equations of a pendulum, at an angle from the vertical, on a support that a spring holds; what `mean_forces` asks
     of them, and forces out of balance. Coordinates: angle, height of the support.
@@ -38,7 +45,7 @@ def on_a_spring(angle: float, damping: float = 0.0) -> tuple[Any, Any]:
     shared = -coupling * np.sin(angle)
     mass = np.array([[BOB * LENGTH**2, shared], [shared, SUPPORT + BOB]])
     equations = SimpleNamespace(
-        mechanism=SimpleNamespace(links=[SimpleNamespace(stiffness=np.array([STIFFNESS]))]),
+        mechanism=springs(1),
         free_joints=[0],
         stiffness_and_damping=lambda t, y, v: (np.diag([0.0, STIFFNESS]), np.diag([0.0, damping])),
         mass_matrix=lambda t, y: mass,
@@ -58,6 +65,38 @@ def test_a_support_that_shakes_turns_a_pendulum_as_kapitza_says(degrees: float) 
     amplitude, square = LOAD / STIFFNESS, STIFFNESS / (SUPPORT + BOB * np.cos(angle) ** 2)
     largest = BOB * amplitude**2 * square / 2
     assert found[0, 0] == pytest.approx(largest * np.sin(angle) * np.cos(angle), rel=0, abs=1e-8 * largest)
+
+
+@pytest.mark.parametrize("coupling", [0.0, 1e-13, 1e-12, 1e-11])
+def test_equal_supports_shake_each_its_pendulum(coupling: float) -> None:
+    """Two of them, under a load and half of it: modes of a pair of equal frequencies are what rounding, or a spring of
+    no strength between the supports, makes them; what each does to its pendulum is not.
+    """
+    angle = 0.7
+    one, forces_of_one = on_a_spring(angle)
+    own, half = [0, 2], [1, 3]  # angles first
+    mass, stiffness = np.zeros((4, 4)), np.diag([0.0, 0.0, STIFFNESS, STIFFNESS])
+    for places in (own, half):
+        mass[np.ix_(places, places)] = one.mass_matrix(0.0, None)
+    stiffness[2:, 2:] += coupling * STIFFNESS * np.array([[1.0, -1.0], [-1.0, 1.0]])
+    equations = SimpleNamespace(
+        mechanism=springs(2),
+        free_joints=[0, 1],
+        stiffness_and_damping=lambda t, y, v: (stiffness, np.zeros((4, 4))),
+        mass_matrix=lambda t, y: mass,
+    )
+
+    def forces(t: Any, y: Any, v: Any, a: Any) -> Any:
+        result = np.zeros_like(y)
+        for places in (own, half):
+            result[:, places] = forces_of_one(t, y[:, places], v[:, places], a[:, places])
+        result[:, 3] += LOAD / 2
+        return result
+
+    start, none, edges = np.array([angle, angle, 0.0, 0.0]), np.zeros(4), np.array([0.0, 1.0])
+    alone = mean_forces(one, forces_of_one, 0.0, np.array([angle, 0.0]), np.zeros(2), np.zeros(2), edges)[0, 0]
+    found = mean_forces(equations, forces, 0.0, start, none, none, edges)
+    assert found[0] == pytest.approx([alone, alone / 4], rel=1e-6)
 
 
 def test_it_dies_out_with_the_energy_of_the_vibration() -> None:
