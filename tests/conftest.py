@@ -6,7 +6,7 @@ import os
 import re
 import tempfile
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
 from multiprocessing import get_context
@@ -43,6 +43,20 @@ def pytest_configure(config: pytest.Config) -> None:
 
     with ThreadPoolExecutor(2) as leads:
         list(leads.map(lead, (names.popleft, names.pop)))  # from both ends: what neighbours share is compiled once
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _data_stays() -> Iterator[None]:
+    """Tests run beside each other and copy the shipped data: one that writes there makes another fail by chance."""
+    before = _folders()
+    yield
+    assert _folders() == before, "a test wrote, if only for a moment, into data/"
+
+
+def _folders() -> dict[Path, int]:
+    """When a file was last made or removed in each folder of the shipped data."""
+    data = Path(__file__).parents[1] / "data"
+    return {folder: folder.stat().st_mtime_ns for folder in (data, *data.rglob("*")) if folder.is_dir()}
 
 
 def _modules() -> deque[str]:

@@ -27,7 +27,7 @@ RECORDS = dict(FILES.values())
 def test_commands_and_python_examples_run_in_order(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Word for word, in a folder that looks like a checkout; commands of one page first, then its Python."""
     shutil.copytree(ROOT / "data", tmp_path / "data")
-    shutil.copytree(ROOT / "docs", tmp_path / "docs")
+    shutil.copytree(ROOT / "docs", tmp_path / "docs", ignore=shutil.ignore_patterns("__pycache__"))
     for command in shell_lines(page):
         assert command.startswith("erls ") or command == REGENERATE
         run(command, tmp_path)

@@ -150,10 +150,11 @@ def test_faults_name_the_field(tmp_path: Path) -> None:
     """And a file of somebody else stays."""
     with pytest.raises(SceneError, match=r"make_scene: joints\[0\].dampng.*did you mean 'damping'"):
         erls.make_scene(**{**TABLES, "joints": [{**TABLES["joints"][0], "dampng": 1.0}]}, links=[LINK])
-    scene = erls.make_scene(folder=DATA / "robot", **TABLES, links=[LINK])
+    robot = shutil.copytree(DATA / "robot", tmp_path / "robot")
+    scene = erls.make_scene(folder=robot, **TABLES, links=[LINK])
     mine = tmp_path / "mine.toml"
     mine.write_text("# mine\n", encoding="utf-8")
-    for target in (mine, tmp_path / "none/x.toml", DATA / "robot/links/arm.toml"):
+    for target in (mine, tmp_path / "none/x.toml", robot / "links/arm.toml"):
         with pytest.raises(SceneError) as refused:
             erls.save_scene(target, scene)
         assert refused.value.cause == Cause.NOT_WRITABLE

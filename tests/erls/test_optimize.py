@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from itertools import pairwise
 from pathlib import Path
 
@@ -332,14 +333,12 @@ def test_a_copy_elsewhere_is_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Table, page, scene of the best design: that has its mass and holds its limit."""
-    copy, page = DATA / "written_by_a_test.toml", tmp_path / "page.html"
-    try:
-        changes = ["--set", 'settings.methods=["esl-system"]', "--set", "settings.starts=2", "--set", BRIEF]
-        assert main(["optimize", str(CANTILEVER), "-o", str(page), "--scene", str(copy), *changes]) == 0
-        text = capsys.readouterr().out
-        run = erls.simulate(erls.load_scene(copy), verdict=False)
-    finally:
-        copy.unlink(missing_ok=True)
+    folder = shutil.copytree(DATA, tmp_path / "optimization")
+    copy, page = folder / "best.toml", tmp_path / "page.html"
+    changes = ["--set", 'settings.methods=["esl-system"]', "--set", "settings.starts=2", "--set", BRIEF]
+    assert main(["optimize", str(folder / CANTILEVER.name), "-o", str(page), "--scene", str(copy), *changes]) == 0
+    text = capsys.readouterr().out
+    run = erls.simulate(erls.load_scene(copy), verdict=False)
     assert "further starts" in text
     assert "Simulated again, all steps" in text
     assert "sag" in page.read_text()
@@ -351,8 +350,9 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None
 
 def test_choice_of_a_material(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Masses go as ρ E^(-1/3); known designs of all options are not run again, and the copy has the best of them."""
-    copy, state, page = DATA / "chosen_by_a_test.toml", tmp_path / "state.npz", tmp_path / "page.html"
-    changes, path = ['settings.methods=["esl-system"]', BRIEF], DATA / "material.toml"
+    folder = shutil.copytree(DATA, tmp_path / "optimization")
+    copy, state, page = folder / "chosen.toml", tmp_path / "state.npz", tmp_path / "page.html"
+    changes, path = ['settings.methods=["esl-system"]', BRIEF], folder / "material.toml"
     found = erls.optimize(path, changes=changes, confirm=False, state=state)
     told = json.loads(json.dumps(summary(found)))
     assert told["chosen"] == {"material": "aluminium"}
@@ -364,12 +364,9 @@ def test_choice_of_a_material(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert told["methods"]["esl-system"]["mass"] == pytest.approx(min(one["mass"] for one in told["choices"]))
     known = {name for name in np.load(state).files if name.endswith(".poses")}
     options = [part for change in changes for part in ("--set", change)]
-    try:
-        again = ["--state", str(state), "--resume", "-o", str(page), "--scene", str(copy)]
-        assert main(["optimize", str(path), *again, *options]) == 0
-        best = erls.load_scene(copy)
-    finally:
-        copy.unlink(missing_ok=True)
+    again = ["--state", str(state), "--resume", "-o", str(page), "--scene", str(copy)]
+    assert main(["optimize", str(path), *again, *options]) == 0
+    best = erls.load_scene(copy)
     assert {name for name in np.load(state).files if name.endswith(".poses")} == known
     assert "Choices" in capsys.readouterr().out
     assert "chosen" in page.read_text()
