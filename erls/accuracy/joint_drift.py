@@ -59,7 +59,7 @@ def joint_drift(
     ways : sequence of (f, d) arrays, or None
         Of `ways_of_joints`.
     sudden : bool
-        Whether friction or limits of motors act.
+        Whether friction, contacts or limits of motors act.
     more : (k, f) array or float
         Forces R beside those (`erls.accuracy.mean_vibration_forces`).
     """

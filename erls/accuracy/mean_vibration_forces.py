@@ -10,7 +10,7 @@ which dies out with the energy of the vibration, as exp(-2 ζ ω t), and is othe
 of unlike frequency have nothing to do with each other, so that their forces add up; those that stay in step to the end
 of the run swing as one, Σ A ψ, or what they are taken to be would follow from rounding. What a run is off by is F of
 the finer links less F of those that it had. What is left out is damped as the least damped mode of the link that was
-kept. Links that are nothing but a modal file have no finer ones, and none of it.
+kept. Links that are nothing but a modal file lack the modes that count as left out of them.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from erls.accuracy.compared_links import Compared, Motion
 from erls.equations.formulation import TreeFormulation
 from erls.equations.serial.equilibrium import elastic_on_diagonal
 from erls.maths.so3 import Array
+from fe_import.model import IntArray
 
 _PHASES, _PHASES_SUDDEN = 8, 32  # of a period: exact for squares of vibrations; where friction and limits jump
 _SMALL = 1e-3  # of the largest energy of a vibration: forces are about proportional to it
@@ -33,7 +34,7 @@ _ELASTIC = 0.5  # of the energy of a mode, in links: the rest are joints on thei
 Forces = Callable[[Array, Array, Array, Array], Array]
 
 
-def mean_vibration_forces(compared: Compared, start: Motion, t: Array, sudden: bool) -> Array:
+def mean_vibration_forces(compared: Compared, start: Motion, t: Array, sudden: bool, borne: Array) -> Array:
     """(k, f) what free joints lack of them at the times t (k,) of a run [N m or N]; of trees.
 
     Parameters
@@ -44,15 +45,19 @@ def mean_vibration_forces(compared: Compared, start: Motion, t: Array, sudden: b
     t : (k,) array
         Middles of stretches of time, two or more, over which means are taken [s]; impulses count from the start on.
     sudden : bool
-        Whether friction or limits of motors act.
+        Whether friction, contacts or limits of motors act.
+    borne : (N,) array
+        By which what is left out is deformed before the start.
     """
     y, v = start.whole[0][0], start.whole[1][0]
-    at, run = float(start.t[0]), compared.run
+    at, run, every = float(start.t[0]), compared.run, np.arange(compared.whole.size)
     edges = np.concatenate([[0.0], (t[1:] + t[:-1]) / 2 - at, t[-1:] - at])
     phases = _PHASES_SUDDEN if sudden else _PHASES
-    whole = mean_forces(compared.whole, compared.forces, at, y, v, _damping_left_out(compared), edges, phases)
-    none = np.zeros(compared.lesser.size)
-    lesser = mean_forces(compared.lesser, compared.lesser_forces, at, y[run], v[run], none, edges, phases)
+    more, none = _damping_left_out(compared), np.zeros(compared.lesser.size)
+    whole = mean_forces(compared.whole, compared.forces, at, y + borne, v, every, more, edges, phases)
+    lesser = mean_forces(
+        compared.lesser, compared.lesser_forces, at, y[run], v[run], compared.own, none, edges, phases
+    )
     found = whole - lesser
     found[0] *= edges[1] / ((t[1] - t[0]) / 2)  # the impulse since the start: drift is followed from t[0] on
     return found
@@ -64,6 +69,7 @@ def mean_forces(
     t: float,
     y: Array,
     v: Array,
+    moving: IntArray,
     more: Array,
     edges: Array,
     phases: int = _PHASES,
@@ -80,6 +86,8 @@ def mean_forces(
         Time of the start [s].
     y, v : (n,) arrays
         Its state.
+    moving : (m,) int array
+        Coordinates that vibrate; the rest stay where they are.
     more : (n,) array
         Damping of coordinates beside that of the equations [1/s].
     edges : (k + 1,) array
@@ -93,8 +101,12 @@ def mean_forces(
         Means over each stretch.
     """
     free = len(equations.free_joints)
+    block = np.ix_(moving, moving)
     stiffness, damping = equations.stiffness_and_damping(t, y, v)
-    squares, modes = la.eigh((stiffness + stiffness.T) / 2, equations.mass_matrix(t, y), check_finite=False)
+    mass = equations.mass_matrix(t, y)[block]
+    squares, parts = la.eigh((stiffness + stiffness.T)[block] / 2, mass, check_finite=False)
+    modes = np.zeros((len(y), len(squares)))
+    modes[moving] = parts
     elastic = (squares > 0) & (elastic_on_diagonal(equations)[0] @ modes**2 > _ELASTIC * squares)
     squares, modes = squares[elastic], modes[:, elastic]
     decay = np.einsum("ij,ik,kj->j", modes, damping + np.diag(more), modes).clip(min=0.0)

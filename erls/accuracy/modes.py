@@ -32,7 +32,7 @@ from fe_import.errors import FEImportError
 
 _TWICE = 2.0  # of what follows vibrations, where these come suddenly
 _MARGIN, _MARGIN_DRIFT = 2.0, 3.0
-_MORE_SUDDEN = 1.25  # times as much where friction and limits of motors act, which errors set off
+_MORE_SUDDEN = 1.25  # times as much where friction, contacts and limits of motors act, which errors set off
 
 
 def modes_error(run: ChainRun) -> tuple[float | None, str]:

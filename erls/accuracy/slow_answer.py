@@ -49,7 +49,7 @@ def slow_answer(
     at_rest : bool
         Whether links are deformed at the start as they bear it at rest; else they start undeformed.
     sudden : bool
-        Whether friction or limits of motors act.
+        Whether friction, contacts or limits of motors act.
     """
     motion, start = parts.slow, parts.start
     found, ways = unbalanced(compared, motion), ways_of_joints(compared, motion)
@@ -73,8 +73,7 @@ def slow_answer(
         answer = _answer_of_loops(compared, motion, duration, found, ways)
         largest = 2 * answer
     if free and len(motion.t) > 1:
-        swung = ways is None and not at_rest
-        more = mean_vibration_forces(compared, start, motion.t, sudden) if swung else 0.0
+        more = mean_vibration_forces(compared, start, motion.t, sudden, borne[0]) if ways is None else 0.0
         drift[:, :free] = joint_drift(compared, motion, found, answer, borne[0], ways, sudden, more)
     times = np.tile(motion.t, 3)
     still, bent, drifted = np.split(

@@ -157,12 +157,13 @@ def test_a_solid_has_no_finer_mesh(tmp_path: Path) -> None:
 
 
 def test_a_file_gives_back_what_was_written(tmp_path: Path) -> None:
-    link = frame_link(tmp_path, reduction={"method": "craig-bampton", "elastic_modes": 4})
-    modal, left = both(link)
+    warm = {"temperature_change": 50.0, "materials": {"m": {"thermal_expansion": 2e-5}}}
+    modal, left = both(frame_link(tmp_path, reduction={"method": "craig-bampton", "elastic_modes": 4}, **warm))
+    assert left.thermal.any()
     write_left_out_file(tmp_path / "a.h5", left)
     found = read_left_out_file(tmp_path / "a.h5", modal)
     assert found.refined == left.refined
-    for name in ("stiffness", "translation_shapes", "rotation_shapes"):
+    for name in ("stiffness", "translation_shapes", "rotation_shapes", "thermal"):
         assert np.array_equal(getattr(found, name), getattr(left, name))
     for name in ("m", "X", "Z", "rigid"):
         assert np.array_equal(getattr(found.invariants, name), getattr(left.invariants, name))
