@@ -29,10 +29,15 @@ _MOST = 4  # times the evaluations of the run that another one may take
 
 
 def other_run(
-    run: ChainRun, formulation: Formulation, options: Options, most: float = 0.0, **more: Any
+    run: ChainRun,
+    formulation: Formulation,
+    options: Options,
+    most: float = 0.0,
+    steps: float = np.inf,
+    **more: Any,
 ) -> Solution | None:
     """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes more
-    than `_MOST` times its evaluations and than ``most``; ``more`` goes to what integrates.
+    than `_MOST` times its evaluations and than ``most``, or more ``steps``; ``more`` goes to what integrates.
 
     Raises
     ------
@@ -42,7 +47,8 @@ def other_run(
     most = max(most, _MOST * run.solution.work.rhs_calls)
 
     def limit(t: float, knots: Callable[[], Solution]) -> None:
-        if knots().work.rhs_calls > most:
+        work = knots().work
+        if work.rhs_calls > most or work.steps > steps:
             raise StopRun
 
     integrate = integrator(formulation.mechanism, run.scene.record.simulation)

@@ -45,12 +45,16 @@ def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
         Link and node of each judged point.
     """
     found, share = None, _SHARE_SUDDEN if sudden(run) else _SHARE
-    mechanism = run.formulation.mechanism
-    if not (mechanism.sticks or mechanism.touches):
-        found = run_at(run, LARGER)
-    if found is None or found.work.steps > LIKE * run.solution.work.steps:
+    mechanism, enough = run.formulation.mechanism, LIKE * run.solution.work.steps
+    larger = not (mechanism.sticks or mechanism.touches)
+    if larger:
+        found = run_at(run, LARGER, enough)
+    if found is None or found.work.steps > enough:
         better = run_at(run, 1 / (_OF_IMPACTS if mechanism.touches else LARGER))
-        found, share = (found, _SHARE) if better is None else (better, _SHARE_SUDDEN)
+        if better is None and larger:
+            found, share = run_at(run, LARGER), _SHARE
+        else:
+            found, share = better, _SHARE_SUDDEN
     if found is None:
         return None
     own, formulation = run.solution, solved(run.formulation)
@@ -65,8 +69,8 @@ def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
     return ErrorOverTime(looks, share * apart + ITERATED * aim, effort, reaction)
 
 
-def run_at(run: ChainRun, times: float) -> Solution | None:
-    """A second run at so many times the tolerance; None where it fails."""
+def run_at(run: ChainRun, times: float, steps: float = np.inf) -> Solution | None:
+    """A second run at so many times the tolerance; None where it fails, or takes more ``steps``."""
     given = options_of(run.scene.record.simulation)
     changed = replace(
         given,
@@ -75,4 +79,4 @@ def run_at(run: ChainRun, times: float) -> Solution | None:
         atol=times * given.atol,
         output_step=None,
     )
-    return other_run(run, solved(run.formulation), changed)
+    return other_run(run, solved(run.formulation), changed, steps=steps)

@@ -118,7 +118,8 @@ class Recorder:
             t, rows = np.append(t, switch.t), np.concatenate([rows, knot[None, : rows.shape[1]]])
         self._keep(t, rows, steps if switch is None else 1)
         if switch is not None:
-            self._look(switch.t)  # nothing is offered: the steps stand beyond it
+            if self._due():
+                self._look(switch.t)  # nothing is offered: the steps stand beyond it
             raise switch
 
     def _keep(self, t: Array, rows: Array, steps: int) -> None:
@@ -129,13 +130,18 @@ class Recorder:
             self._kept = knots, before + steps, (np.concatenate([times, t]), np.concatenate([states, rows]))
 
     def _tell(self, t: float) -> None:
-        if self.switching is not None and t < self.switching.leg.end:  # steps come one by one
-            now = time.perf_counter()
-            if now - self._told < _PAUSE:
-                return
-            self._told = now
+        if self.switching is not None and t < self.switching.leg.end and not self._due():  # steps come one by one
+            return
         self._look(t)
         self._offer()
+
+    def _due(self) -> bool:
+        """Whether the observer was told of nothing for a while."""
+        now = time.perf_counter()
+        if now - self._told < _PAUSE:
+            return False
+        self._told = now
+        return True
 
     def _look(self, t: float) -> None:
         """Tell the observer, and drop what need not be kept."""
