@@ -10,7 +10,6 @@ motors within a step): the first steps of a run are held against a quarter of th
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import msgspec
@@ -23,10 +22,11 @@ from erls.equations.nodal.assembly import NodalSystem
 from erls.equations.nodal.equations import Nodal
 from erls.equations.substructures import solved
 from erls.errors import Cause
-from erls.integrate.base import Companion, Solution, StopRun, hermite
+from erls.integrate.base import Companion, Solution, hermite
 from erls.integrate.choice import body_options, integrator, options_of
 from erls.integrate.lie_generalized_alpha import lie_generalized_alpha
 from erls.integrate.step_distance import STATED, Track, distance_bands, errors_over_time, samples, step_ratio
+from erls.integrate.work_limit import work_limit
 from erls.maths.so3 import Array
 from erls.run.bodies.motion import BodyMotion
 from erls.run.chain.run import ChainRun
@@ -171,11 +171,7 @@ def _with_steps(run: ChainRun | BodyMotion, larger: float, most: float, end: flo
     refused.
     """
     s = run.solution
-
-    def limit(t: float, knots: Callable[[], Solution]) -> None:
-        if knots().work.rejected_steps > most:
-            raise StopRun
-
+    limit = work_limit(refused=most)
     step = larger * (float(s.t[-1]) - float(s.t[0])) / s.work.steps
     times = float(s.t[0]), float(s.t[-1]) if end is None else min(end, float(s.t[-1]))
     if isinstance(run, BodyMotion):

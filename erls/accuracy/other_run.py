@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Set
+from collections.abc import Set
 from dataclasses import replace
 from typing import Any
 
@@ -15,8 +15,9 @@ from erls.equations.formulation import Formulation
 from erls.equations.registry import formulate
 from erls.equations.substructures import solved
 from erls.errors import Cause, SimulationError
-from erls.integrate.base import Options, Solution, StopRun, hermite
+from erls.integrate.base import Options, Solution, hermite
 from erls.integrate.choice import integrator, options_of
+from erls.integrate.work_limit import work_limit
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import in_order
@@ -44,13 +45,7 @@ def other_run(
     SimulationError
         INTERRUPTED.
     """
-    most = max(most, _MOST * run.solution.work.rhs_calls)
-
-    def limit(t: float, knots: Callable[[], Solution]) -> None:
-        work = knots().work
-        if work.rhs_calls > most or work.steps > steps:
-            raise StopRun
-
+    limit = work_limit(max(most, _MOST * run.solution.work.rhs_calls), steps)
     integrate = integrator(formulation.mechanism, run.scene.record.simulation)
     times = float(run.solution.t[0]), run.end
     found = integrate(formulation, times, *formulation.initial_state(), options, limit, **more)

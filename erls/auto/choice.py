@@ -182,7 +182,7 @@ class _Looks:
             self.purse.spent += price
         s = self.whole.solution
         start = (s.y[0], s.v[0]) if same_start(mechanism, less) else None
-        found = difference(self.whole, coarse_run(self.scene, less, self.count, start))
+        found = difference(self.whole, coarse_run(self.scene, less, self.count, start, self.whole))
         measured = replace(cut, error=found.error, effort_error=found.effort_error or 0.0)
         if self.room.take(measured):
             self.taken.append(measured)

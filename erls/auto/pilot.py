@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -10,8 +9,8 @@ import numpy as np
 from erls.auto.operations import ITERATIONS
 from erls.auto.probe import fixed_steps
 from erls.equations.registry import formulate
-from erls.integrate.base import Solution, StopRun
 from erls.integrate.choice import integrator, options_of
+from erls.integrate.work_limit import work_limit
 from erls.mechanism.chain import Mechanism
 from erls.scene.chain import Scene
 
@@ -35,15 +34,10 @@ def count_steps(scene: Scene, mechanism: Mechanism) -> float:
     y, v = formulation.initial_state()
     options = replace(options_of(settings), step=None, output_step=None)
     end = _PILOT * settings.duration
-    solution = integrator(mechanism, settings)(formulation, (0.0, end), y, v, options, _until_enough)
+    solution = integrator(mechanism, settings)(formulation, (0.0, end), y, v, options, work_limit(_ENOUGH))
     if solution.failure is not None:
         raise solution.failure
     reached = float(solution.t[-1])
     late = np.count_nonzero(solution.t > reached / 2) / max(len(solution.t), 1)  # without its first, small steps
     return 2 * late * solution.work.rhs_calls / ITERATIONS * settings.duration / max(reached, 1e-300)
 
-
-def _until_enough(t: float, knots: Callable[[], Solution]) -> None:
-    """End a run of many evaluations."""
-    if knots().work.rhs_calls >= _ENOUGH:
-        raise StopRun

@@ -23,6 +23,7 @@ from erls.equations.system import metre_scales
 from erls.errors import Cause
 from erls.integrate.base import Options, hermite
 from erls.integrate.choice import integrator
+from erls.integrate.work_limit import work_limit
 from erls.maths.so3 import Array
 from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
@@ -34,6 +35,7 @@ PLACES, EFFORTS = 16, 6  # times at which points and drive forces are compared
 UNRESOLVED = 0.1  # of the tolerance: what vibrations may add that the steps do not follow
 _RADIUS = 0.7
 _TIMES = 241
+_MORE = 4  # times the evaluations of a run with everything, that one without something may take
 _TURN = 0.5  # rad per step: beyond, a look says nothing
 
 
@@ -86,8 +88,12 @@ def resolved(settings: Simulation, found: Vibrations) -> Resolution:
     return resolution(found, UNRESOLVED * settings.effects_tolerance)
 
 
-def coarse_run(scene: Scene, mechanism: Mechanism, count: int, start: State | None = None) -> ChainRun:
-    """A run in ``count`` steps; failures stand in the run."""
+def coarse_run(
+    scene: Scene, mechanism: Mechanism, count: int, start: State | None = None, whole: ChainRun | None = None
+) -> ChainRun:
+    """A run in ``count`` steps; failures stand in the run, which ends early where it takes many times the work of the
+    ``whole`` one: its steps are halved again and again.
+    """
     settings = scene.record.simulation
     coarse = msgspec.structs.replace(
         settings, integrator="generalized_alpha", step=settings.duration / count, spectral_radius=_RADIUS
@@ -95,7 +101,8 @@ def coarse_run(scene: Scene, mechanism: Mechanism, count: int, start: State | No
     formulation = formulate(mechanism, coarse)
     y, v = formulation.initial_state() if start is None else start
     options = Options(coarse.step, coarse.rtol, coarse.atol, _RADIUS, newton_tolerance=1e-9)
-    solution = integrator(mechanism, coarse)(formulation, (0.0, settings.duration), y, v, options, None)
+    limit = None if whole is None else work_limit(_MORE * whole.solution.work.rhs_calls)
+    solution = integrator(mechanism, coarse)(formulation, (0.0, settings.duration), y, v, options, limit)
     if solution.failure is not None and solution.failure.cause == Cause.INTERRUPTED:
         raise solution.failure
     return ChainRun(scene, formulation, solution)
@@ -110,7 +117,7 @@ def too_coarse(run: ChainRun, count: int) -> bool:
 
 def difference(whole: ChainRun, less: ChainRun) -> Difference:
     """Between two coarse runs, at the times when they are farthest apart; the second one may lack coordinates."""
-    if less.solution.failure is not None:
+    if less.solution.failure is not None or less.end < whole.end:
         return Difference(np.inf, None)
     system = solved(whole.formulation)
     kept = kept_places(whole.formulation.mechanism, less.formulation.mechanism, system.size)

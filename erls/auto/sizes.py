@@ -122,7 +122,7 @@ def _size(
 ) -> tuple[Difference, float, float]:
     """Difference, largest force, and share of the operations of an evaluation."""
     settings = scene.record.simulation
-    apart = _or_fails(lambda: difference(whole, coarse_run(scene, less, count)), Difference(np.inf, None))
+    apart = _or_fails(lambda: difference(whole, coarse_run(scene, less, count, whole=whole)), Difference(np.inf, None))
     force = _or_fails(lambda: _force(whole, formulate(less, settings)), np.inf)
     return apart, force, _share(operations(whole.formulation.mechanism), operations(faster))
 

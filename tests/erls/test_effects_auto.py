@@ -16,6 +16,7 @@ from small_systems import Modes
 
 import erls
 from erls.auto import automatic as automatic_module
+from erls.auto import probe
 from erls.auto.automatic import automatic
 from erls.auto.certify import certify, following
 from erls.auto.choice import Choice, affordable, choose_effects
@@ -23,7 +24,7 @@ from erls.auto.coordinates import kept_places
 from erls.auto.cuts import RIGID, Cut
 from erls.auto.error_motion import Knots, error_motion
 from erls.auto.outputs import Outputs, effort_error, largest_distance, watched_nodes
-from erls.auto.probe import coarse_run
+from erls.auto.probe import coarse_run, difference
 from erls.cli.main import main
 from erls.equations.quick import quick
 from erls.equations.registry import formulate
@@ -95,6 +96,26 @@ def test_error_motion_compiled_and_uncompiled(tmp_path: Path) -> None:
         ours, other = (getattr(side, name) for side in sides)
         assert np.abs(ours - other).max() < 1e-12 * np.abs(other).max()
         assert np.abs(other).max() > 1e-6
+
+
+def test_a_look_that_takes_far_more_work_than_the_whole_run_is_ended(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without an effect steps may be halved until nothing comes of it: 240 s beside 0.7 s of a shipped robot. What ends
+    is the same to the bit.
+    """
+    scene = load_scene(scenes.three_links(tmp_path))
+    mechanism = build_mechanism(scene).mechanism
+    less = without(mechanism, {"coriolis"})
+    whole = coarse_run(scene, mechanism, 40)
+    free, held = coarse_run(scene, less, 40), coarse_run(scene, less, 40, whole=whole)
+    assert np.array_equal(free.solution.y, held.solution.y)
+    assert 0 < difference(whole, held).error < 1
+    monkeypatch.setattr(probe, "_MORE", 0.5)
+    monkeypatch.setattr("erls.integrate.driver._PAUSE", 0.0)  # all steps are looked at
+    ended = coarse_run(scene, less, 40, whole=whole)
+    assert ended.end < whole.end
+    assert difference(whole, ended).error == np.inf
 
 
 def _distance(run: ChainRun, reference: ChainRun) -> float:
