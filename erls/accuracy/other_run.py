@@ -12,7 +12,7 @@ import numpy as np
 from erls.accuracy.judged_places import judged_nodes, judged_places
 from erls.auto.outputs import Watched
 from erls.equations.formulation import Formulation
-from erls.equations.registry import formulate
+from erls.equations.registry import TREES, formulate
 from erls.equations.substructures import solved
 from erls.errors import Cause, SimulationError
 from erls.integrate.base import Options, Solution, hermite
@@ -23,6 +23,8 @@ from erls.mechanism.chain import Mechanism
 from erls.mechanism.effects import in_order
 from erls.run.chain.run import ChainRun
 from erls.scene.build import build_mechanism
+from erls.scene.integrators import FIXED_STEP
+from erls.scene.settings import Simulation
 
 _PLACES = 60
 _SHARE = 1.2  # of the distance from other equations, whose run has an error of integration, too
@@ -35,10 +37,12 @@ def other_run(
     options: Options,
     most: float = 0.0,
     steps: float = np.inf,
+    settings: Simulation | None = None,
     **more: Any,
 ) -> Solution | None:
     """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes more
-    than `_MOST` times its evaluations and than ``most``, or more ``steps``; ``more`` goes to what integrates.
+    than `_MOST` times its evaluations and than ``most``, or more ``steps``. By the integrator of ``settings``, which
+    are those of the run unless given; ``more`` goes to what integrates.
 
     Raises
     ------
@@ -46,7 +50,7 @@ def other_run(
         INTERRUPTED.
     """
     limit = work_limit(max(most, _MOST * run.solution.work.rhs_calls), steps)
-    integrate = integrator(formulation.mechanism, run.scene.record.simulation)
+    integrate = integrator(formulation.mechanism, settings or run.scene.record.simulation)
     times = float(run.solution.t[0]), run.end
     found = integrate(formulation, times, *formulation.initial_state(), options, limit, **more)
     if found.failure is not None and found.failure.cause == Cause.INTERRUPTED:
@@ -78,6 +82,8 @@ def mechanism_with(run: ChainRun, effects: Set[str]) -> Mechanism:
 def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[float | None, str]:
     """What a run is off by the equations of another mechanism in the same formulation [m], or None, and why.
 
+    Fixed steps may not resolve what the other one does: its steps follow the tolerance, where they can.
+
     Parameters
     ----------
     run : ChainRun
@@ -86,14 +92,19 @@ def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[fl
     most : float
         Evaluations that it may take, where that is more than `_MOST` times those of the run.
     """
-    options = replace(options_of(run.scene.record.simulation), output_step=None)
-    try:
-        formulation = solved(formulate(whole, run.scene.record.simulation))
-        found = other_run(run, formulation, options, most)
-    except SimulationError as problem:  # it has no start, as where links are softer under their loads
-        if problem.cause == Cause.INTERRUPTED:
-            raise
-        found = None
-    if found is None:
-        return None, "a run with all effects fails; use effects = 'all'"
-    return float(_SHARE * distance_from(run, judged_nodes(run), formulation, found)[1][-1]), ""
+    own = run.scene.record.simulation
+    every = [own]
+    if own.integrator == FIXED_STEP and own.formulation in TREES and own.coordinates != "absolute":
+        every.insert(0, msgspec.structs.replace(own, integrator="auto", step=None))
+    for settings in every:
+        options = replace(options_of(settings), output_step=None)
+        try:
+            formulation = solved(formulate(whole, settings))
+            found = other_run(run, formulation, options, most, settings=settings)
+        except SimulationError as problem:  # it has no start, as where links are softer under their loads
+            if problem.cause == Cause.INTERRUPTED:
+                raise
+            found = None
+        if found is not None:
+            return float(_SHARE * distance_from(run, judged_nodes(run), formulation, found)[1][-1]), ""
+    return None, "a run with all effects fails; use effects = 'all'"

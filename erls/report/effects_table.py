@@ -75,7 +75,7 @@ def effects_text(found: Survey) -> str:
             f'auto: what effects = "auto" does at a tolerance of {settings.effects_tolerance:.2g} m. force: largest '
             "generalized force, as one on all mass alike. error: largest distance of named points without the effect, "
             "in coarse runs"
-            + ("; fails: no motion without it, or none that four times the work can follow" if FAILS in outcomes else "")
+            + ("; fails: no motion without it, or none that four times the work follows" if FAILS in outcomes else "")
             + ("; unstable: points leave their links" if UNSTABLE in outcomes else "")
             + (". drives: change of drive forces, relative to their peak" if drives else "")
             + ". time: part of an evaluation of the equations that leaving it out saves, with effects that share its "

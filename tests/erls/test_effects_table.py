@@ -51,7 +51,7 @@ def test_an_effect_without_which_there_is_no_motion_fails(tmp_path: Path, capsys
     assert rows["gravity"]["outcome"] is None
     assert rows["gravity"]["error"] > 0
     assert FAILS in next(line for line in text.split("\n") if line.startswith("inertia_second_order"))
-    assert "fails: no motion without it, or none that four times the work can follow" in text.replace("\n", " ")
+    assert "fails: no motion without it, or none that four times the work follows" in text.replace("\n", " ")
     assert len(rows) + len(found["left_out"]) == len(EFFECTS)
 
 
