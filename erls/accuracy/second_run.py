@@ -51,10 +51,10 @@ def second_run_error(run: ChainRun, watched: Watched) -> ErrorOverTime | None:
         found = run_at(run, LARGER, enough)
     if found is None or found.work.steps > enough:
         better = run_at(run, 1 / (_OF_IMPACTS if mechanism.touches else LARGER))
-        if better is None and larger:
-            found, share = run_at(run, LARGER), _SHARE
-        else:
+        if better is not None:
             found, share = better, _SHARE_SUDDEN
+        elif larger:
+            found, share = found or run_at(run, LARGER), _SHARE
     if found is None:
         return None
     own, formulation = run.solution, solved(run.formulation)

@@ -40,4 +40,3 @@ def count_steps(scene: Scene, mechanism: Mechanism) -> float:
     reached = float(solution.t[-1])
     late = np.count_nonzero(solution.t > reached / 2) / max(len(solution.t), 1)  # without its first, small steps
     return 2 * late * solution.work.rhs_calls / ITERATIONS * settings.duration / max(reached, 1e-300)
-

@@ -42,7 +42,7 @@ def test_it_ends_once_it_takes_more_steps_than_it_may(run: erls.ChainRun, monkey
     [
         (1.0, (), [8.0]),
         (0.0, (), [8.0, 1 / 8]),  # as many steps tell nothing
-        (0.0, (1 / 8,), [8.0, 1 / 8, 8.0]),  # but where there is no better run
+        (0.0, (1 / 8,), [8.0, 1 / 8]),  # but where there is no better run
         (1.0, (8.0,), [8.0, 1 / 8]),
         (1.0, (8.0, 1 / 8), [8.0, 1 / 8, 8.0]),
     ],
@@ -60,7 +60,7 @@ def test_a_better_run_is_made_where_a_larger_tolerance_tells_nothing(
     monkeypatch.setattr(second_run, "LIKE", enough)
     found = second_run_error(run, judged_nodes(run))
     assert made == asked
-    assert (found is None) == (asked[-1] in fails)
+    assert (found is None) == (set(asked) <= set(fails))
 
 
 def test_switches_are_told_no_more_often_than_steps(run: erls.ChainRun, monkeypatch: pytest.MonkeyPatch) -> None:
