@@ -118,7 +118,7 @@ class Recorder:
             t, rows = np.append(t, switch.t), np.concatenate([rows, knot[None, : rows.shape[1]]])
         self._keep(t, rows, steps if switch is None else 1)
         if switch is not None:
-            if self._due():
+            if self._apart is not None or self._due():  # what need not be kept is dropped before the next leg begins
                 self._look(switch.t)  # nothing is offered: the steps stand beyond it
             raise switch
 
