@@ -82,7 +82,8 @@ def mechanism_with(run: ChainRun, effects: Set[str]) -> Mechanism:
 def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[float | None, str]:
     """What a run is off by the equations of another mechanism in the same formulation [m], or None, and why.
 
-    Fixed steps may not resolve what the other one does: its steps follow the tolerance, where they can.
+    Fixed steps may not resolve what the other one does: its steps follow the tolerance, where they can. What such a run
+    is off by for its steps is then in the figure once more.
 
     Parameters
     ----------

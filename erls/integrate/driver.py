@@ -130,18 +130,15 @@ class Recorder:
             self._kept = knots, before + steps, (np.concatenate([times, t]), np.concatenate([states, rows]))
 
     def _tell(self, t: float) -> None:
-        if self.switching is not None and t < self.switching.leg.end and not self._due():  # steps come one by one
-            return
-        self._look(t)
-        self._offer()
+        if self.switching is None or t >= self.switching.leg.end or self._due():  # else steps come one by one
+            self._look(t)
+            self._offer()
 
     def _due(self) -> bool:
         """Whether the observer was told of nothing for a while."""
-        now = time.perf_counter()
-        if now - self._told < _PAUSE:
-            return False
-        self._told = now
-        return True
+        if due := time.perf_counter() - self._told >= _PAUSE:
+            self._told = time.perf_counter()
+        return due
 
     def _look(self, t: float) -> None:
         """Tell the observer, and drop what need not be kept."""
@@ -390,11 +387,8 @@ def run_to_end(
             )
         except MemoryError:
             recorder.release()
-            failure = SimulationError(
-                Cause.OUT_OF_MEMORY,
-                "out of memory",
-                remedy="the motion up to this time was kept; give a larger simulation.output_step, or free memory",
-            )
+            remedy = "the motion up to this time was kept; give a larger simulation.output_step, or free memory"
+            failure = SimulationError(Cause.OUT_OF_MEMORY, "out of memory", remedy=remedy)
         except SimulationError as error:
             failure = error
     if recorder.time is None:  # a solution always has a knot
