@@ -12,30 +12,40 @@ Beside the mechanism that was run stands one whose links hold what their reducti
 Vibrations, what follows them and what follows slow loads have nothing to do with each other: their squares add up.
 Drift comes on top, of which errors of first order tell less, since joints that go astray bear other loads. All have a
 margin (`benchmarks/random_scenes.py`).
+
+In loops all of this comes back through the other links, which makes more of it near dead centres, and vibrations drive
+joints: there a run with all modes says what they change, where it takes no more than a moment.
 """
 
 from __future__ import annotations
 
+import msgspec
 import numpy as np
 
 from erls.accuracy.compared_links import compared_links
 from erls.accuracy.configurations import configurations
 from erls.accuracy.finer_links import finer_links, lumped
 from erls.accuracy.integration import sudden
+from erls.accuracy.judged import Judged
 from erls.accuracy.left_out_vibrations import left_out_vibrations
+from erls.accuracy.other_run import distance_beside, following_tolerance
 from erls.accuracy.slow_answer import slow_answer, start_of_loops
 from erls.accuracy.slow_motion import parted
 from erls.equations.registry import TREES
 from erls.equations.substructures import solved
+from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from fe_import.errors import FEImportError
 
 _TWICE = 2.0  # of what follows vibrations, where these come suddenly
 _MARGIN, _MARGIN_DRIFT = 2.0, 3.0
+_MARGIN_RUN = 2.0  # of the distance from a run with all modes, both of which have errors of integration
+_WORK = 3e7  # evaluations times squared coordinates that it may take: most of a second
+_RESOLVED = 0.1  # of the estimate, to which it is integrated
 _MORE_SUDDEN = 1.25  # times as much where friction, contacts and limits of motors act, which errors set off
 
 
-def modes_error(run: ChainRun) -> tuple[float | None, str]:
+def modes_error(run: ChainRun) -> Judged:
     """Error by modes left out of links, and by the mesh of links made of beams.
 
     Parameters
@@ -44,26 +54,24 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
 
     Returns
     -------
-    error : float or None
-        Largest over named points and the run [m]; None where it cannot be judged.
-    note : str
-        Why, or what is not in it; may be empty.
+    Judged
+        Largest over named points and the run [m]; None where it cannot be judged. Why, or what is not in it.
     """
     moving = solved(run.formulation)
     if not any(link.elastic_modes or lumped(link) for link in moving.mechanism.links):
-        return 0.0, ""
+        return Judged(0.0)
     try:
         if run.scene.record.simulation.formulation not in TREES:
             from erls.accuracy.mesh_of_beams import mesh_error  # here: it imports nodal elements
 
-            return mesh_error(run)
+            return Judged(*mesh_error(run))
         finer = finer_links(run.scene, run.formulation.mechanism, moving.mechanism)
     except FEImportError as problem:
-        return None, f"the finite-element model of a link is not at hand: {problem}"
+        return Judged(None, f"the finite-element model of a link is not at hand: {problem}")
     compared = compared_links(run, moving, finer)
     motion = parted(run, moving, compared)
     if motion is None:
-        return None, "no states to judge"
+        return Judged(None, "no states to judge")
     duration = run.end - float(run.solution.t[0])
     places = configurations(compared, motion)
     at_rest, jumps = run.formulation.mechanism.static_start, sudden(run)
@@ -73,4 +81,19 @@ def modes_error(run: ChainRun) -> tuple[float | None, str]:
     off, follows = left_out_vibrations(compared, motion, places, duration)
     moved = _MARGIN * np.sqrt(static**2 + (_TWICE * follows) ** 2 + off**2) + _MARGIN_DRIFT * drift
     error = float((_MORE_SUDDEN if jumps else 1.0) * moved.max(initial=0.0))
-    return (error, "; ".join(finer.notes)) if np.isfinite(error) else (None, "motion without bound")
+    notes = "; ".join(finer.notes)
+    if compared.tied is not None and len(finer.kept) == len(finer.run):  # links from modal files have no more modes
+        most = _WORK / compared.whole.size**2
+        if run.solution.work.rhs_calls <= most and (known := _of_a_run(run, finer.mechanism, error, most)) is not None:
+            return Judged(known, notes, grown=True)
+    return Judged(error, notes) if np.isfinite(error) else Judged(None, "motion without bound")
+
+
+def _of_a_run(run: ChainRun, whole: Mechanism, estimate: float, most: float) -> float | None:
+    """From a run with all modes, whose integration leaves the estimate visible [m]; None where it takes too long."""
+    own = run.scene.record.simulation
+    settings = following_tolerance(own) or own
+    if np.isfinite(estimate):
+        settings = msgspec.structs.replace(settings, tolerance=max(own.tolerance, _RESOLVED * estimate))
+    distance = distance_beside(run, whole, settings, most)
+    return None if distance is None else _MARGIN_RUN * distance

@@ -35,21 +35,21 @@ def other_run(
     run: ChainRun,
     formulation: Formulation,
     options: Options,
-    most: float = 0.0,
+    most: float | None = None,
     steps: float = np.inf,
     settings: Simulation | None = None,
     **more: Any,
 ) -> Solution | None:
     """Integrate other equations, or with other options, over the time of a run; None where that fails, or takes more
-    than `_MOST` times its evaluations and than ``most``, or more ``steps``. By the integrator of ``settings``, which
-    are those of the run unless given; ``more`` goes to what integrates.
+    than ``most`` evaluations, `_MOST` times its own unless given, or more ``steps``. By the integrator of ``settings``,
+    which are those of the run unless given; ``more`` goes to what integrates.
 
     Raises
     ------
     SimulationError
         INTERRUPTED.
     """
-    limit = work_limit(max(most, _MOST * run.solution.work.rhs_calls), steps)
+    limit = work_limit(_MOST * run.solution.work.rhs_calls if most is None else most, steps)
     integrate = integrator(formulation.mechanism, settings or run.scene.record.simulation)
     times = float(run.solution.t[0]), run.end
     found = integrate(formulation, times, *formulation.initial_state(), options, limit, **more)
@@ -79,6 +79,42 @@ def mechanism_with(run: ChainRun, effects: Set[str]) -> Mechanism:
     return build_mechanism(scene).mechanism
 
 
+def distance_beside(run: ChainRun, whole: Mechanism, settings: Simulation, most: float) -> float | None:
+    """How far points of a run get from those of another mechanism [m]; None where that fails or takes too long.
+
+    Parameters
+    ----------
+    run : ChainRun
+    whole : Mechanism
+        The same with more effects or modes.
+    settings : Simulation
+        By which it is integrated.
+    most : float
+        Evaluations that it may take.
+
+    Raises
+    ------
+    SimulationError
+        INTERRUPTED.
+    """
+    options = replace(options_of(settings), output_step=None)
+    try:
+        formulation = solved(formulate(whole, settings))
+        found = other_run(run, formulation, options, most, settings=settings)
+    except SimulationError as problem:  # it has no start, as where links are softer under their loads
+        if problem.cause == Cause.INTERRUPTED:
+            raise
+        return None
+    return None if found is None else float(distance_from(run, judged_nodes(run), formulation, found)[1][-1])
+
+
+def following_tolerance(settings: Simulation) -> Simulation | None:
+    """Those with steps that follow the tolerance, by the default integrator; None where there is none such."""
+    if settings.formulation not in TREES or settings.coordinates == "absolute":
+        return None
+    return msgspec.structs.replace(settings, integrator="auto", step=None)
+
+
 def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[float | None, str]:
     """What a run is off by the equations of another mechanism in the same formulation [m], or None, and why.
 
@@ -94,18 +130,9 @@ def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[fl
         Evaluations that it may take, where that is more than `_MOST` times those of the run.
     """
     own = run.scene.record.simulation
-    every = [own]
-    if own.integrator == FIXED_STEP and own.formulation in TREES and own.coordinates != "absolute":
-        every.insert(0, msgspec.structs.replace(own, integrator="auto", step=None))
-    for settings in every:
-        options = replace(options_of(settings), output_step=None)
-        try:
-            formulation = solved(formulate(whole, settings))
-            found = other_run(run, formulation, options, most, settings=settings)
-        except SimulationError as problem:  # it has no start, as where links are softer under their loads
-            if problem.cause == Cause.INTERRUPTED:
-                raise
-            found = None
-        if found is not None:
-            return float(_SHARE * distance_from(run, judged_nodes(run), formulation, found)[1][-1]), ""
+    adaptive = following_tolerance(own) if own.integrator == FIXED_STEP else None
+    for settings in (own,) if adaptive is None else (adaptive, own):
+        distance = distance_beside(run, whole, settings, max(most, _MOST * run.solution.work.rhs_calls))
+        if distance is not None:
+            return _SHARE * distance, ""
     return None, "a run with all effects fails; use effects = 'all'"

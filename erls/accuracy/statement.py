@@ -5,12 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import NamedTuple
 
 import numpy as np
 
 from erls.accuracy.audits import audits
 from erls.accuracy.integration import ITERATED, SUDDEN, sudden
+from erls.accuracy.judged import Judged
 from erls.accuracy.judged_integration import Integrated, judged_integration
 from erls.accuracy.judged_places import judged_nodes
 from erls.accuracy.left_out_effects import effects_error
@@ -26,13 +26,6 @@ from erls.run.chain.run import ChainRun
 from erls.run.watches.stored_output import output_error
 
 _FARTHEST = 4.0  # times the reach: two points at opposite ends of it, on links that deflect as far again
-
-
-class Judged(NamedTuple):
-    """A part: metres, or None, and what is to be said of it."""
-
-    error: float | None
-    note: str = ""
 
 
 def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
@@ -57,7 +50,8 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         "output": _judged(lambda: (output_error(run), "")),
     }
     integrated = judged_integration(run, judged_nodes(run), _sum(found))
-    for name, times in (("modes", integrated.amplified()), ("links", SUDDEN if sudden(run) else 1.0)):
+    amplified = 1.0 if found["modes"].grown else integrated.amplified()
+    for name, times in (("modes", amplified), ("links", SUDDEN if sudden(run) else 1.0)):
         found[name] = found[name]._replace(error=_within(found[name].error, times, reach))
     others = _sum(found)
     found["integration"] = _capped(integrated, reach)
@@ -90,20 +84,20 @@ def _within(error: float | None, times: float, reach: float) -> float | None:
     return None if error is None else min(times * error, reach)
 
 
-def _judged(find: Callable[[], tuple[float | None, str]]) -> Judged:
+def _judged(find: Callable[[], tuple[float | None, str] | Judged]) -> Judged:
     """A part; one that cannot be evaluated is not known."""
     try:
         with np.errstate(all="ignore"):
-            error, note = find()
+            found = Judged(*find())
     except SimulationError as problem:
         if problem.cause == Cause.INTERRUPTED:
             raise
         return Judged(None, f"it cannot be evaluated: {problem}")
     except np.linalg.LinAlgError as problem:
         return Judged(None, f"it cannot be evaluated: {problem}")
-    if error is not None and not math.isfinite(error):
-        return Judged(None, note or "the estimate is not finite")
-    return Judged(error, note)
+    if found.error is not None and not math.isfinite(found.error):
+        return Judged(None, found.note or "the estimate is not finite")
+    return found
 
 
 def _capped(found: Integrated, reach: float) -> Judged:

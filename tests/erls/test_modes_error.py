@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import scenes
 
+from erls.accuracy import modes
 from erls.accuracy.compared_links import Motion
 from erls.accuracy.joint_drift import joint_drift
 from erls.accuracy.modes import modes_error
@@ -58,7 +59,7 @@ def distance(first: ChainRun, second: ChainRun) -> float:
 
 
 def stated(run: ChainRun) -> float:
-    error, _ = modes_error(run)
+    error = modes_error(run).error
     assert error is not None
     return error
 
@@ -112,13 +113,19 @@ def distance_of_ends(first: ChainRun, second: ChainRun) -> float:
     return float(np.linalg.norm(ends[0] - ends[1], axis=1).max())
 
 
-def test_loops_state_what_their_links_leave_out(tmp_path: Path) -> None:
+def test_loops_state_what_their_links_leave_out(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = scenes.ROOT / "data" / "four_bar" / "flexible.toml"
     few = [f"links.{name}.reduction.fixed_interface_modes=1" for name in ("crank", "coupler", "rocker")]
     few += [f"links.{name}.reduction.elastic_modes=7" for name in ("crank", "coupler", "rocker")]
     short = "simulation.duration=0.3"
     run = run_of(scene, short, *few)
     actual = distance(run, run_of(scene, short, *finer(tmp_path, scene, 2)))
+    by_a_run = modes_error(run)
+    assert by_a_run.grown
+    assert by_a_run.error is not None
+    assert actual <= by_a_run.error <= 3 * actual
+    monkeypatch.setattr(modes, "_WORK", 0.0)  # as where that run would take too long
+    assert not modes_error(run).grown
     assert actual <= stated(run) <= 20 * actual
 
 
@@ -150,6 +157,21 @@ def test_loops_that_swing_drift(tmp_path: Path) -> None:
     actual = distance(run, run_of(scene, *finer(tmp_path, scene, 2)))
     assert actual <= stated(run) + FLOOR
     assert stated(run) <= 20 * max(actual, FLOOR)
+
+
+def test_loops_of_modal_files_are_not_held_against_themselves(tmp_path: Path) -> None:
+    """One link of three lies in a file, which holds no more modes: a run with all of them would leave it as it is."""
+    scene = undriven_four_bar(tmp_path, simulation={"duration": 0.02})
+    source = scenes.ROOT / "data" / "four_bar" / "links" / "coupler.toml"
+    write_modal_file(tmp_path / "coupler.modal.h5", reduce_link(load_link(source)))
+    data = scenes.read_toml(scene)
+    filed = {"name": "coupler", "modal_file": "coupler.modal.h5"}
+    links = [filed if link["name"] == "coupler" else link for link in data["links"]]
+    error, note, grown = modes_error(run_of(scenes.write_toml(tmp_path / "filed.toml", {**data, "links": links})))
+    assert error is not None
+    assert error > 0
+    assert "highest third" in note
+    assert not grown
 
 
 def test_rotation_vectors_that_are_exchanged_make_no_error(tmp_path: Path) -> None:
@@ -242,7 +264,7 @@ def test_a_column_near_flutter_is_judged_as_pressed(tmp_path: Path) -> None:
 def test_rigid_links_leave_nothing_out(tmp_path: Path) -> None:
     scenes.l_link(tmp_path)
     scene = scenes.l_scene(tmp_path, simulation={"duration": 0.05})
-    assert modes_error(run_of(scene, "links.l.flexible=false")) == (0.0, "")
+    assert modes_error(run_of(scene, "links.l.flexible=false")) == (0.0, "", False)
 
 
 def test_a_modal_file_is_judged_by_its_own_modes(tmp_path: Path) -> None:
@@ -252,7 +274,7 @@ def test_a_modal_file_is_judged_by_its_own_modes(tmp_path: Path) -> None:
     described = stated(run_of(scene))
     link = {"name": "l", "modal_file": "l.modal.h5"}
     filed = scenes.write_toml(tmp_path / "filed.toml", {**scenes.read_toml(scene), "links": [link]})
-    error, note = modes_error(run_of(filed))
+    error, note, _ = modes_error(run_of(filed))
     assert "highest third" in note
     assert error is not None
     assert error >= described
@@ -262,7 +284,7 @@ def test_a_link_that_has_changed_is_not_judged(tmp_path: Path) -> None:
     scenes.l_link(tmp_path, 4, reduction={"method": "craig-bampton", "fixed_interface_modes": 3})
     run = run_of(scenes.l_scene(tmp_path, simulation={"duration": 0.02}))
     scenes.l_link(tmp_path, 5)
-    error, note = modes_error(run)
+    error, note, _ = modes_error(run)
     assert error is None
     assert "not the one" in note
 

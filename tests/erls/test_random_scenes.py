@@ -24,6 +24,9 @@ SEEDS = range(300)
 FAULTY = (879, 1216)
 """Of the benchmark's 2,000, those that once ended in a traceback."""
 
+LOOPS = (1834, 2116, 2118)
+"""Whose modes are off by more than is foretold without a run with all modes: near dead centres, and by vibrations."""
+
 WORK, ENDLESS = 0.1, 0.03
 STORED = ROOT / "tests/data/random_scenes.csv"
 UNCOVERED = frozenset({95, 174, 285})
@@ -41,7 +44,7 @@ REFERENCES = _stored()
 OUT_OF_WORK = {seed for seed, row in REFERENCES.items() if row["outcome"] == f"failed: {Cause.BUDGET}"}
 
 
-@pytest.mark.parametrize("seed", [*SEEDS, *FAULTY])
+@pytest.mark.parametrize("seed", [*SEEDS, *FAULTY, *LOOPS])
 def test_scene_ends_typed_and_stated_error_holds(seed: int) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that overflow where a motion runs away
