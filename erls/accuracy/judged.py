@@ -4,10 +4,24 @@ from __future__ import annotations
 
 from typing import NamedTuple
 
+MARGIN = 2.0
+"""Of the distance from a better run: that is off by its integration, too, and looked at in some instants alone."""
+
 
 class Judged(NamedTuple):
-    """Metres, or None, and what is to be said of it; ``grown`` if it holds what the motion makes of small errors."""
+    """Metres, or None, and what is to be said of it; ``apart`` the distance of a better run, where one was made [m]."""
 
     error: float | None
     note: str = ""
-    grown: bool = False
+    apart: float | None = None
+
+    def grown(self, times: float, integration: float | None) -> Judged:
+        """So many times the error, as the motion makes disturbances grow; but no more than `MARGIN` times the distance
+        of a better run, which holds what they grow to, and no less than so much of it as the integration leaves over.
+        """
+        error = None if self.error is None else times * self.error
+        if self.apart is None:
+            return self._replace(error=error)
+        least = MARGIN * max(0.0, self.apart - (integration or 0.0))
+        most = MARGIN * self.apart
+        return self._replace(error=most if error is None else min(max(error, least), most))

@@ -13,8 +13,9 @@ Vibrations, what follows them and what follows slow loads have nothing to do wit
 Drift comes on top, of which errors of first order tell less, since joints that go astray bear other loads. All have a
 margin (`benchmarks/random_scenes.py`).
 
-In loops all of this comes back through the other links, which makes more of it near dead centres, and vibrations drive
-joints: there a run with all modes says what they change, where it takes no more than a moment.
+That is what can be foretold. Where it takes no more than a moment the whole mechanism is run as well, and its distance
+tells between which bounds the error lies (`erls.accuracy.judged`): what is foretold misses dead centres of loops, and
+can be far too large.
 """
 
 from __future__ import annotations
@@ -24,24 +25,24 @@ import numpy as np
 
 from erls.accuracy.compared_links import compared_links
 from erls.accuracy.configurations import configurations
-from erls.accuracy.finer_links import finer_links, lumped
+from erls.accuracy.finer_links import FinerLinks, finer_links, lumped
 from erls.accuracy.integration import sudden
 from erls.accuracy.judged import Judged
 from erls.accuracy.left_out_vibrations import left_out_vibrations
 from erls.accuracy.other_run import distance_beside, following_tolerance
 from erls.accuracy.slow_answer import slow_answer, start_of_loops
 from erls.accuracy.slow_motion import parted
+from erls.equations.formulation import Formulation
+from erls.equations.quasi_static.formulation import QuasiStatic
 from erls.equations.registry import TREES
 from erls.equations.substructures import solved
-from erls.mechanism.chain import Mechanism
 from erls.run.chain.run import ChainRun
 from fe_import.errors import FEImportError
 
 _TWICE = 2.0  # of what follows vibrations, where these come suddenly
 _MARGIN, _MARGIN_DRIFT = 2.0, 3.0
-_MARGIN_RUN = 2.0  # of the distance from a run with all modes, both of which have errors of integration
-_WORK = 3e7  # evaluations times squared coordinates that it may take: most of a second
-_RESOLVED = 0.1  # of the estimate, to which it is integrated
+_WORK = 3e7  # evaluations times squared coordinates that a run with all modes may take: most of a second
+_RESOLVED = 0.1  # of what is foretold, for which it is integrated
 _MORE_SUDDEN = 1.25  # times as much where friction, contacts and limits of motors act, which errors set off
 
 
@@ -68,6 +69,29 @@ def modes_error(run: ChainRun) -> Judged:
         finer = finer_links(run.scene, run.formulation.mechanism, moving.mechanism)
     except FEImportError as problem:
         return Judged(None, f"the finite-element model of a link is not at hand: {problem}")
+    foretold = _foretold(run, moving, finer)
+    return foretold._replace(apart=_distance(run, finer, foretold.error))
+
+
+def _distance(run: ChainRun, finer: FinerLinks, foretold: float | None) -> float | None:
+    """From a run with all modes, whose integration leaves visible what is foretold [m]; None where it would take too
+    long, of links from modal files, which have no more modes, where modes follow statically, since what that leaves out
+    is another part, and where loads may press links, which makes what is left out softer, by data that nobody has.
+    """
+    own = run.scene.record.simulation
+    more = sum(link.elastic_modes for link in finer.mechanism.links) - len(finer.run)
+    most = _WORK / (run.solution.y.shape[1] + more) ** 2
+    unlike = isinstance(run.formulation, QuasiStatic) or len(finer.kept) < len(finer.run) or finer.mechanism.loads
+    if unlike or run.solution.work.rhs_calls > most:
+        return None
+    settings = following_tolerance(own) or own
+    if foretold is not None:
+        settings = msgspec.structs.replace(settings, tolerance=max(own.tolerance, _RESOLVED * foretold))
+    return distance_beside(run, finer.mechanism, settings, most)
+
+
+def _foretold(run: ChainRun, moving: Formulation, finer: FinerLinks) -> Judged:
+    """From the equations of the whole mechanism along the motion that was run."""
     compared = compared_links(run, moving, finer)
     motion = parted(run, moving, compared)
     if motion is None:
@@ -81,19 +105,6 @@ def modes_error(run: ChainRun) -> Judged:
     off, follows = left_out_vibrations(compared, motion, places, duration)
     moved = _MARGIN * np.sqrt(static**2 + (_TWICE * follows) ** 2 + off**2) + _MARGIN_DRIFT * drift
     error = float((_MORE_SUDDEN if jumps else 1.0) * moved.max(initial=0.0))
-    notes = "; ".join(finer.notes)
-    if compared.tied is not None and len(finer.kept) == len(finer.run):  # links from modal files have no more modes
-        most = _WORK / compared.whole.size**2
-        if run.solution.work.rhs_calls <= most and (known := _of_a_run(run, finer.mechanism, error, most)) is not None:
-            return Judged(known, notes, grown=True)
-    return Judged(error, notes) if np.isfinite(error) else Judged(None, "motion without bound")
-
-
-def _of_a_run(run: ChainRun, whole: Mechanism, estimate: float, most: float) -> float | None:
-    """From a run with all modes, whose integration leaves the estimate visible [m]; None where it takes too long."""
-    own = run.scene.record.simulation
-    settings = following_tolerance(own) or own
-    if np.isfinite(estimate):
-        settings = msgspec.structs.replace(settings, tolerance=max(own.tolerance, _RESOLVED * estimate))
-    distance = distance_beside(run, whole, settings, most)
-    return None if distance is None else _MARGIN_RUN * distance
+    if not np.isfinite(error):
+        return Judged(None, "motion without bound")
+    return Judged(error, "; ".join(finer.notes))

@@ -109,10 +109,10 @@ def distance_beside(run: ChainRun, whole: Mechanism, settings: Simulation, most:
 
 
 def following_tolerance(settings: Simulation) -> Simulation | None:
-    """Those with steps that follow the tolerance, by the default integrator; None where there is none such."""
-    if settings.formulation not in TREES or settings.coordinates == "absolute":
+    """Those with steps that follow the tolerance, by the default integrator; None of beam elements."""
+    if settings.formulation not in TREES:
         return None
-    return msgspec.structs.replace(settings, integrator="auto", step=None)
+    return msgspec.structs.replace(settings, integrator="auto", step=None, coordinates="independent")
 
 
 def error_beside(run: ChainRun, whole: Mechanism, most: float = 0.0) -> tuple[float | None, str]:

@@ -50,11 +50,11 @@ def stated(run: ChainRun, tolerance: float | None = None) -> ChainRun:
         "output": _judged(lambda: (output_error(run), "")),
     }
     integrated = judged_integration(run, judged_nodes(run), _sum(found))
-    amplified = 1.0 if found["modes"].grown else integrated.amplified()
-    for name, times in (("modes", amplified), ("links", SUDDEN if sudden(run) else 1.0)):
-        found[name] = found[name]._replace(error=_within(found[name].error, times, reach))
+    integration = _capped(integrated, reach)
+    found["modes"] = _within(found["modes"].grown(integrated.amplified(), integration.error), reach)
+    found["links"] = _within(found["links"].grown(SUDDEN if sudden(run) else 1.0, None), reach)
     others = _sum(found)
-    found["integration"] = _capped(integrated, reach)
+    found["integration"] = integration
     accuracy = Accuracy(
         **{name: found[name].error for name in PARTS},
         efforts=integrated.efforts,
@@ -79,9 +79,9 @@ def _sum(found: Mapping[str, Judged]) -> float:
     return math.fsum(part.error or 0.0 for part in found.values())
 
 
-def _within(error: float | None, times: float, reach: float) -> float | None:
-    """So many times an error, but no point is farther off than the mechanism reaches."""
-    return None if error is None else min(times * error, reach)
+def _within(part: Judged, reach: float) -> Judged:
+    """No point is farther off than the mechanism reaches."""
+    return part if part.error is None else part._replace(error=min(part.error, reach))
 
 
 def _judged(find: Callable[[], tuple[float | None, str] | Judged]) -> Judged:
