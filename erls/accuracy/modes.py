@@ -42,6 +42,7 @@ from fe_import.errors import FEImportError
 _TWICE = 2.0  # of what follows vibrations, where these come suddenly
 _MARGIN, _MARGIN_DRIFT = 2.0, 3.0
 _WORK = 3e7  # evaluations times squared coordinates that a run with all modes may take: most of a second
+_SMALL = 0.1  # of the tolerance, what the integration may take
 _RESOLVED = 0.1  # of what is foretold, for which it is integrated
 _MORE_SUDDEN = 1.25  # times as much where friction, contacts and limits of motors act, which errors set off
 
@@ -74,15 +75,18 @@ def modes_error(run: ChainRun) -> Judged:
 
 
 def _distance(run: ChainRun, finer: FinerLinks, foretold: float | None) -> float | None:
-    """From a run with all modes, whose integration leaves visible what is foretold [m]; None where it would take too
-    long, of links from modal files, which have no more modes, where modes follow statically, since what that leaves out
-    is another part, and where loads may press links, which makes what is left out softer, by data that nobody has.
+    """From a run with all modes, whose integration leaves visible what is foretold [m].
+
+    None where that is small and there are no loops, in which it may miss more than it tells; where the run would take
+    too long; of links from modal files, which have no more modes; where modes follow statically, since what that leaves
+    out is another part; and where loads may press links, which makes what is left out softer, by data that nobody has.
     """
     own = run.scene.record.simulation
     more = sum(link.elastic_modes for link in finer.mechanism.links) - len(finer.run)
     most = _WORK / (run.solution.y.shape[1] + more) ** 2
+    small = foretold is not None and foretold <= _SMALL * own.tolerance and not run.formulation.mechanism.loops
     unlike = isinstance(run.formulation, QuasiStatic) or len(finer.kept) < len(finer.run) or finer.mechanism.loads
-    if unlike or run.solution.work.rhs_calls > most:
+    if small or unlike or run.solution.work.rhs_calls > most:
         return None
     settings = following_tolerance(own) or own
     if foretold is not None:
