@@ -13,7 +13,7 @@ import scenes
 
 from erls.accuracy.compared_links import Motion
 from erls.accuracy.joint_drift import joint_drift
-from erls.accuracy.judged import MARGIN, Judged
+from erls.accuracy.judged import LEAST, Judged
 from erls.accuracy.modes import modes_error
 from erls.accuracy.slow_motion import averages
 from erls.accuracy.unbalanced_forces import Unbalanced
@@ -73,7 +73,7 @@ def check(run: ChainRun, actual: float, most: float = 20.0) -> None:
     assert actual <= judged.error + FLOOR
     assert judged.error <= most * max(actual, FLOOR)
     if judged.apart is not None:
-        assert actual / MARGIN <= judged.apart + FLOOR
+        assert actual / LEAST <= judged.apart + FLOOR
         assert judged.apart <= 3 * max(actual, FLOOR)
 
 
@@ -181,13 +181,13 @@ def test_loops_of_modal_files_are_not_held_against_themselves(tmp_path: Path) ->
 
 
 def test_a_part_lies_within_what_a_better_run_tells() -> None:
-    """No more than twice its distance, and no less than twice what the error of the integration leaves of it."""
-    assert Judged(1e-4, apart=2e-5).grown(1.0, 5e-6).error == pytest.approx(4e-5)
+    """No more than three times its distance, and no less than twice what the error of the integration leaves of it."""
+    assert Judged(1e-4, apart=2e-5).grown(1.0, 5e-6).error == pytest.approx(6e-5)
     assert Judged(1e-6, apart=2e-5).grown(1.0, 5e-6).error == pytest.approx(3e-5)
     assert Judged(1e-6, apart=2e-5).grown(1.0, 1e-3).error == pytest.approx(1e-6)
     assert Judged(1e-5, apart=2e-5).grown(3.0, 1e-3).error == pytest.approx(3e-5)  # growing disturbances
     assert Judged(1e-5).grown(3.0, 1e-3).error == pytest.approx(3e-5)
-    assert Judged(None, apart=2e-5).grown(3.0, None).error == pytest.approx(4e-5)
+    assert Judged(None, apart=2e-5).grown(3.0, None).error == pytest.approx(6e-5)
     assert Judged(None).grown(3.0, None).error is None
 
 
