@@ -20,6 +20,8 @@ can be far too large.
 
 from __future__ import annotations
 
+import math
+
 import msgspec
 import numpy as np
 
@@ -57,7 +59,8 @@ def modes_error(run: ChainRun) -> Judged:
     Returns
     -------
     Judged
-        Largest over named points and the run [m]; None where it cannot be judged. Why, or what is not in it.
+        Largest over named points and the run [m]; None where it cannot be judged. Why, or what is not in it. Of a run
+        with all modes, where one is made, the distance: the error of the integration has a part in that.
     """
     moving = solved(run.formulation)
     if not any(link.elastic_modes or lumped(link) for link in moving.mechanism.links):
@@ -71,7 +74,7 @@ def modes_error(run: ChainRun) -> Judged:
     except FEImportError as problem:
         return Judged(None, f"the finite-element model of a link is not at hand: {problem}")
     foretold = _foretold(run, moving, finer)
-    return foretold._replace(apart=_distance(run, finer, foretold.error))
+    return foretold._replace(apart=_distance(run, finer, foretold.error)).grown(1.0, math.inf)
 
 
 def _distance(run: ChainRun, finer: FinerLinks, foretold: float | None) -> float | None:
