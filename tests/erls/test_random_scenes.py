@@ -30,8 +30,9 @@ SEEDS = range(300)
 FAULTY = (879, 1216)
 """Of the benchmark's 2,000, those that once ended in a traceback."""
 
-LOOPS = (1834, 2116, 2118)
-"""Whose modes are off by more than is foretold without a run with all modes: near dead centres, and by vibrations."""
+MENDED = (1725, 1834, 2116, 2118, 2261, 2288, 2348)
+"""Once stated too low: modes foretold without a run with all of them, near dead centres of loops and where friction
+acts; rigid mechanisms with friction, set beside a run at a larger tolerance."""
 
 WORK, ENDLESS = 0.1, 0.03
 STORED = ROOT / "tests/data/random_scenes.csv"
@@ -62,7 +63,7 @@ def links_that_pass(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("links_that_pass")
-@pytest.mark.parametrize("seed", [*SEEDS, *FAULTY, *LOOPS])
+@pytest.mark.parametrize("seed", [*SEEDS, *FAULTY, *MENDED])
 def test_scene_ends_typed_and_stated_error_holds(seed: int) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", RuntimeWarning)  # of numbers that overflow where a motion runs away
