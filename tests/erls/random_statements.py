@@ -18,18 +18,28 @@ Row = dict[str, Any]
 
 
 def reference_row(row: Row) -> dict[str, Any]:
-    """What tests keep of a row: actual errors at the tenths of the run in one field, separated by blanks."""
+    """What tests keep of a row: actual errors, and what they are in doubt by, at the tenths of the run, each in one field,
+    separated by blanks.
+    """
     actual = row.get("actual", {})
-    fields = {part: " ".join(f"{value:.3g}" for value in actual.get(part) or ()) for part in PARTS}
-    doubt = worst(row, "doubt", "total")
+    fields = {part: _joined(actual.get(part) or ()) for part in PARTS}
+    doubt = (row.get("doubt") or {}).get("total") or [math.nan]
     end = f"{row['end']:.6g}" if "end" in row else ""
-    return {"seed": row["seed"], "outcome": row["outcome"], "end": end, "doubt": f"{doubt:.3g}", **fields}
+    return {"seed": row["seed"], "outcome": row["outcome"], "end": end, "doubt": _joined(doubt), **fields}
+
+
+def _joined(values: Iterable[float]) -> str:
+    return " ".join(f"{value:.3g}" for value in values)
 
 
 def row_of(stored: dict[str, str]) -> Row:
-    """What `reference_row` keeps, as a row to which a statement can be added: doubts are those of the whole run."""
+    """What `reference_row` keeps, as a row to which a statement can be added; of older rows, which keep one doubt, that of
+    the whole run at all times.
+    """
     actual = {part: [float(value) for value in stored[part].split()] for part in PARTS}
-    doubt = [float(stored["doubt"])] * len(actual["total"])
+    doubt = [float(value) for value in stored["doubt"].split()]
+    if len(doubt) == 1:
+        doubt *= len(actual["total"])
     doubts = {"doubt": {"integration": doubt, "total": doubt}} if doubt and not math.isnan(doubt[0]) else {}
     return {"seed": int(stored["seed"]), "outcome": stored["outcome"], "labels": {}, "actual": actual, **doubts}
 
