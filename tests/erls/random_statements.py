@@ -18,8 +18,8 @@ Row = dict[str, Any]
 
 
 def reference_row(row: Row) -> dict[str, Any]:
-    """What tests keep of a row: actual errors, and what they are in doubt by, at the tenths of the run, each in one field,
-    separated by blanks.
+    """What tests keep of a row: actual errors, and what they are in doubt by, at the tenths of the run, in one field
+    each, separated by blanks.
     """
     actual = row.get("actual", {})
     fields = {part: _joined(actual.get(part) or ()) for part in PARTS}
@@ -33,8 +33,8 @@ def _joined(values: Iterable[float]) -> str:
 
 
 def row_of(stored: dict[str, str]) -> Row:
-    """What `reference_row` keeps, as a row to which a statement can be added; of older rows, which keep one doubt, that of
-    the whole run at all times.
+    """What `reference_row` keeps, as a row to which a statement can be added; older rows keep one doubt, taken at all
+    times.
     """
     actual = {part: [float(value) for value in stored[part].split()] for part in PARTS}
     doubt = [float(value) for value in stored["doubt"].split()]
