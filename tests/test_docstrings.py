@@ -28,7 +28,7 @@ def test_module(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
         public = not member_name.startswith("_") and getattr(member, "__module__", None) == name
         if public and (inspect.isfunction(member) or inspect.isclass(member)):
             assert member.__doc__, f"{name}.{member_name} has no docstring"
-    assert doctest.testmod(module).failed == 0
+    assert ">>>" not in inspect.getsource(module) or doctest.testmod(module).failed == 0  # looking takes long
 
 
 def test_the_examples_of_the_api_are_among_them() -> None:

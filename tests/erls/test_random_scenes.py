@@ -36,7 +36,7 @@ acts; rigid mechanisms with friction, set beside a run at a larger tolerance."""
 
 WORK, ENDLESS = 0.1, 0.03
 STORED = ROOT / "tests/data/random_scenes.csv"
-UNCOVERED = frozenset({95, 174, 285})
+UNCOVERED = frozenset({95, 285})
 """Seeds whose stated total is below the actual one: friction decides what becomes of a small disturbance."""
 
 
