@@ -43,7 +43,7 @@ from fe_import.errors import FEImportError
 
 _TWICE = 2.0  # of what follows vibrations, where these come suddenly
 _MARGIN, _MARGIN_DRIFT = 2.0, 3.0
-_WORK = 3e7  # evaluations times squared coordinates that a run with all modes may take: most of a second
+_WORK = 3e7  # evaluations times squared coordinates that a run with all modes may take: mostly less than a second
 _SMALL = 0.1  # of the tolerance, what the integration may take
 _RESOLVED = 0.1  # of what is foretold, for which it is integrated
 _MORE_SUDDEN = 1.25  # times as much where friction, contacts and limits of motors act, which errors set off
